@@ -22,9 +22,10 @@ from antennate.cli.robot import PortOptions, at_hand, key_of, parse_robot, requi
 from antennate.cli.terminal import BAD_INPUT, OK
 from antennate.control.registry import BUILT_IN
 from antennate.errors import BadInputError, ConfigError, LogError, OutputError
-from antennate.hardware.config import DriveConfig, TeleopConfig
+from antennate.hardware.config import DriveConfig, GoalsConfig, TeleopConfig
 from antennate.hardware.driving.connect import connect
 from antennate.hardware.driving.drive import Operator, drive
+from antennate.hardware.driving.goals import GoalController
 from antennate.hardware.driving.report import MANY, Recent
 from antennate.hardware.driving.stopping import Arrival
 from antennate.hardware.driving.teleop import Gamepad, KeyController
@@ -43,8 +44,10 @@ from antennate.telemetry.ticks import Tick
 from antennate.types import Controller
 
 if TYPE_CHECKING:
+    from antennate.telemetry.view.goals import ReceivedGoals
     from antennate.telemetry.view.process import ViewProcess
 
+_Made = Callable[[Session, DriveConfig, "ReceivedGoals | None"], tuple[str, Controller]]
 _LONGEST_DRAWN = 12_000
 """Most ticks of a log that is drawn for the report: it takes some four seconds."""
 
@@ -76,21 +79,42 @@ TELEOP_VIEW = dataclasses.replace(
 
 
 @dataclass(frozen=True)
-class DriveOptions(ResultOptions, PortOptions, PageOptions):
+class WalkOptions(ResultOptions, PortOptions, PageOptions):
     """Whether to move."""
 
     arm: bool = option(False, "torque on after the dry run")
     until: Path | None = option(None, "end once this file exists, as of a light gate", "FILE")
 
 
+@dataclass(frozen=True)
+class DriveOptions(WalkOptions):
+    """Whether to move, and by whom."""
+
+    accept: bool = option(
+        False, "walk by goals of joints from ROS 2, in place of a controller", needs=["--ros"]
+    )
+
+
 def command(argv: Sequence[str]) -> int:
     """Drive until the duration is over or it is stopped."""
-    config, options = parse_robot("drive", DESCRIPTION, DriveConfig, argv, DriveOptions)
+    model = GoalsConfig if "--accept" in argv else DriveConfig
+    config, options = parse_robot("drive", DESCRIPTION, model, argv, DriveOptions)
     require_antennae(config.robot, "drive")
-    return _walk(VIEW, config, options, argv)
+    return _walk(VIEW, config, options, argv, _by_goals if options.accept else None)
 
 
-def _require_robot(config: DriveConfig, options: DriveOptions) -> None:
+def _by_goals(
+    session: Session, config: DriveConfig, received: ReceivedGoals | None
+) -> tuple[str, Controller]:
+    """The controller by goals, and its name in the log."""
+    if received is None:
+        raise ConfigError("--accept: expected --ros beside it, found none")
+    control, robot = config.control, config.robot
+    newest, now = received.newest, session.clock.now
+    return "goals", GoalController(control, robot, config.goals, newest, now)
+
+
+def _require_robot(config: DriveConfig, options: WalkOptions) -> None:
     """Refuse to arm a robot whose zeros are not known, and ports that are none."""
     if options.arm and (lack := zeros_lack(config.robot, config.zeros)):
         raise ConfigError(f"--arm: {lack}")
@@ -103,9 +127,9 @@ def _require_robot(config: DriveConfig, options: DriveOptions) -> None:
 def _walk(
     view: View,
     config: DriveConfig,
-    options: DriveOptions,
+    options: WalkOptions,
     argv: Sequence[str],
-    controller: Callable[[Session, DriveConfig], Controller] | None = None,
+    controller: _Made | None = None,
 ) -> int:
     """Drive by the controller that is named, or by another one: the exit code.
 
@@ -114,13 +138,14 @@ def _walk(
         config: The robot, and for how long.
         options: Where it is, and whether it moves.
         argv: The words of the command.
-        controller: Makes the controller once the session is there; None for the one that is named.
+        controller: Makes the controller and its name in the log once the session is there; None for
+            the one that is named.
     """
     _require_robot(config, options)
     given, config = config, config.calibrated()
-    key = key_of(options)
+    key, accept = key_of(options), isinstance(options, DriveOptions) and options.accept
     with (
-        page_of(options, idle=True) or contextlib.nullcontext() as page,
+        page_of(options, idle=not accept, accept=accept) or contextlib.nullcontext() as page,
         _operator(config, options) as operator,
         folder_for(view, options, config, argv) as folder,
     ):
@@ -129,9 +154,10 @@ def _walk(
         with connect(config, options.esp32, options.bus, key) as session:
             if operator.stop is not None:
                 operator.stop.closed = True  # until the first tick: from here on there is a result
+            received = _received(page) if accept else None
             if controller is not None:
-                session.control.controller = controller(session, config)
-                config = config.model_copy(update={"controller": view.name})
+                name, session.control.controller = controller(session, config, received)
+                config = config.model_copy(update={"controller": name})
             header = Header(
                 controller=config.controller,
                 params=config.control,
@@ -140,8 +166,11 @@ def _walk(
                 calibration=_calibration(given),
             )
             file = None if page is None else page.channel.fileno()
-            record = _Record(header, folder.path / LOG, config.record_required, file)
+            log = folder.path / LOG
+            record = _Record(header, log, config.record_required, file, options.ros)
             result = _carry_out(view.name, config, session, options, record, operator, page)
+            if received is not None:
+                result["goals"] = {"taken": received.taken, "refused": received.refused}
         try:
             folder.finish(result, ())
         finally:  # the robot's state is told even if it cannot be kept
@@ -161,7 +190,16 @@ def _walk(
     return BAD_INPUT if viewer.failed(result) or result["log_cut"] else OK
 
 
-def _show(result: Mapping[str, Any], options: DriveOptions, replay: str) -> None:
+def _received(page: ViewProcess | None) -> ReceivedGoals | None:
+    """Goals that the process of the topics passes on."""
+    if page is None:
+        return None
+    from antennate.telemetry.view.goals import ReceivedGoals  # for few drives
+
+    return ReceivedGoals(page.channel)
+
+
+def _show(result: Mapping[str, Any], options: WalkOptions, replay: str) -> None:
     """Table and sentences; `replay` is the command that reads the log."""
     again = f"What was read and decided: {replay}"
     if not result["logs"]:
@@ -171,16 +209,21 @@ def _show(result: Mapping[str, Any], options: DriveOptions, replay: str) -> None
 
 @dataclasses.dataclass(frozen=True)
 class _Record:
-    """What the log begins with, its first file, whether it is required, and the file of a page."""
+    """What the log begins with, its first file, whether it is required, and the file of a page.
+
+    `every` says whether that gets each tick.
+    """
 
     header: Header
     log: Path
     required: bool
     page: int | None
+    every: bool
 
     def words(self, number: int) -> list[str]:
         """The command line of the process that writes the n-th file."""
         more = [viewer.REQUIRED] if self.required else []
+        more += [viewer.EVERY] if self.every else []
         more += [f"{viewer.PAGE}{file}" for file in self.files]
         return [sys.executable, "-m", viewer.MODULE, str(part(self.log, number)), *more]
 
@@ -204,7 +247,7 @@ def _carry_out(
     command: str,
     config: DriveConfig,
     session: Session,
-    options: DriveOptions,
+    options: WalkOptions,
     record: _Record,
     operator: Operator,
     page: ViewProcess | None,
@@ -250,7 +293,7 @@ def _carry_out(
 
 
 @contextlib.contextmanager
-def _operator(config: DriveConfig, options: DriveOptions) -> Iterator[Operator]:
+def _operator(config: DriveConfig, options: WalkOptions) -> Iterator[Operator]:
     """Who may stop the drive: signals, a key that is let go, a file that comes."""
     with contextlib.ExitStack() as stack:
         stop = stack.enter_context(StopOnce(last=True))
@@ -268,7 +311,7 @@ def _operator(config: DriveConfig, options: DriveOptions) -> Iterator[Operator]:
 
 
 @dataclass(frozen=True)
-class TeleopOptions(DriveOptions):
+class TeleopOptions(WalkOptions):
     """Whether to move, and by what."""
 
     gamepad: Path | None = option(None, "gamepad in place of keys, as /dev/input/js0", "FILE")
@@ -285,9 +328,12 @@ def teleop(argv: Sequence[str]) -> int:
     _require_robot(config, options)
     with _keys(options.gamepad, config.teleop.gamepad_silence) as keys:
 
-        def controller(session: Session, calibrated: DriveConfig) -> KeyController:
+        def controller(
+            session: Session, calibrated: DriveConfig, received: ReceivedGoals | None
+        ) -> tuple[str, Controller]:
             control, robot = calibrated.control, calibrated.robot
-            return KeyController(control, robot, config.teleop, keys, session.clock.now)
+            by_keys = KeyController(control, robot, config.teleop, keys, session.clock.now)
+            return TELEOP_VIEW.name, by_keys
 
         return _walk(TELEOP_VIEW, config, options, argv, controller)
 

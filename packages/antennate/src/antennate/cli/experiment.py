@@ -245,7 +245,7 @@ def _view(options: Options) -> contextlib.AbstractContextManager[SimulationView 
     Raises:
         AntennateError: It cannot be served.
     """
-    if not (options.view or options.foxglove):
+    if not options.is_shown:
         return contextlib.nullcontext()
     from antennate.cli.pages import view_of  # imports much, for a page that few runs want
 
@@ -257,14 +257,14 @@ def _require_possible(experiment: Experiment[Any, Any], options: Options, config
 
     What is run beside a view is run in this process.
     """
-    if options.view or options.foxglove:
+    if options.is_shown:
         for name in OF_WORKERS:
             value = getattr(options, name)
             if value != fields_of(Options)[name].default and (name, value) != ("workers", 1):
                 words = "one" if value is True else as_typed(value)
                 raise ConfigError(
-                    f"{flag_of((name,))}: expected none beside --view or --foxglove, which show "
-                    f"one trial after the other, found {words}"
+                    f"{flag_of((name,))}: expected none beside --view, --foxglove or --ros, "
+                    f"which show one trial after the other, found {words}"
                 )
     if options.shard is None:
         return

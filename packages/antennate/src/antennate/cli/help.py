@@ -27,7 +27,7 @@ _SHORT_LINES = 46
 """Most lines of the short page: two screens of 24, less a prompt on each."""
 
 _LATER = ("--calibration-right", "--reach", "--sensor-id", "--insecure-udp", "--key")
-_LATER += ("--view", "--foxglove", "--video", "--slurm", "--shard", "--no-config")
+_LATER += ("--view", "--foxglove", "--ros", "--video", "--slurm", "--shard", "--no-config")
 _LATER += ("--readings", "--knows", "--json", "--overwrite")
 """Options that nobody uses first: they come last on the short page."""
 _FIRST = ("--config", "--esp32", "--bus", "--arm", "--until")

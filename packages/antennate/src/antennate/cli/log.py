@@ -16,8 +16,8 @@ from pydantic.dataclasses import dataclass
 
 from antennate import experiments
 from antennate.cli.arguments import parse
-from antennate.cli.options import FoxgloveOptions, option
-from antennate.cli.pages import MODULE
+from antennate.cli.options import LiveOptions, option
+from antennate.cli.pages import MODULE, place_of
 from antennate.cli.results import ResultOptions, log_of, require_new, show_result
 from antennate.cli.terminal import BAD_INPUT, OK, progress, stop_signals
 from antennate.control.readings import condition
@@ -305,7 +305,7 @@ A run with several logs wants the name of one. Ctrl-C ends it."""
 
 
 @dataclass(frozen=True)
-class ShownOptions(FoxgloveOptions):
+class ShownOptions(LiveOptions):
     """What to show, and where."""
 
     shown: Path | None = option(None, "a log, or the folder of a run", "RUN|LOG", positional=True)
@@ -331,7 +331,9 @@ def view(argv: Sequence[str]) -> int:
     with (
         stop_signals(last=True),
         contextlib.suppress(KeyboardInterrupt),  # that is how it ends
-        ViewProcess(options.port, MODULE, options.port_for_foxglove, "--port") as page,
+        ViewProcess(
+            options.port, MODULE, options.port_for_foxglove, "--port", ros=place_of(options)
+        ) as page,
     ):
         player = LogPlayer(page.channel, header, str(path), options.speed, arena)
         while not page.channel.closed:

@@ -21,7 +21,7 @@ from antennate.errors import ConfigError
 from antennate.messages import shortened
 from antennate.params.base import meaning
 from antennate.params.faults import group_of
-from antennate.telemetry import FOXGLOVE_PORT, PAGE_PORT
+from antennate.telemetry import FOXGLOVE_PORT, LAST_DOMAIN, PAGE_PORT
 
 _METAVARS = {int: "INT", float: "FLOAT", str: "TEXT", Path: "FILE"}
 _BOUNDS = {"gt": "above", "ge": "at least", "lt": "below", "le": "at most"}
@@ -284,8 +284,8 @@ class Command(NamedTuple):
 
 
 @pydantic.dataclasses.dataclass(frozen=True)
-class FoxgloveOptions:
-    """Whether other tools may read along."""
+class LiveOptions:
+    """Whether other programs may read along."""
 
     foxglove: bool = option(
         False, "topics live for Foxglove and Lichtblick, without access control"
@@ -299,6 +299,17 @@ class FoxgloveOptions:
         le=65535,
     )
 
+    ros: bool = option(False, "topics live for ROS 2, without access control")
+    ros_domain: int | None = option(
+        None,
+        "domain of these, else ROS_DOMAIN_ID or 0",
+        "INT",
+        needs=["--ros"],
+        ge=0,
+        le=LAST_DOMAIN,
+    )
+    ros_network: bool = option(False, "these for other computers too", needs=["--ros"])
+
     @property
     def port_for_foxglove(self) -> int | None:
         """The port for Foxglove, None without it."""
@@ -306,13 +317,18 @@ class FoxgloveOptions:
 
 
 @pydantic.dataclasses.dataclass(frozen=True)
-class PageOptions(FoxgloveOptions):
+class PageOptions(LiveOptions):
     """Where the page is."""
 
     view: bool = option(False, "show it on a page of this computer while it runs")
     view_port: int = option(
         PAGE_PORT, "port of that page, 0 takes any", "PORT", needs=["--view"], ge=0, le=65535
     )
+
+    @property
+    def is_shown(self) -> bool:
+        """Whether anything is to be shown while it runs."""
+        return self.view or self.foxglove or self.ros
 
 
 @pydantic.dataclasses.dataclass(frozen=True)
@@ -324,7 +340,7 @@ class ViewOptions(PageOptions):
         1.0,
         "times real time at which --view begins, 0 as fast as it goes",
         "FLOAT",
-        needs=["--view", "--foxglove"],
+        needs=["--view", "--foxglove", "--ros"],
         ge=0,
         le=100,
     )

@@ -6,46 +6,80 @@ Run as a module it is that process, which tells the address of the page and noth
 from __future__ import annotations
 
 import contextlib
+import os
 import signal
 import socket
 import sys
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
-from antennate.cli.options import PageOptions, ViewOptions
+from antennate.cli.options import LiveOptions, PageOptions, ViewOptions
 from antennate.cli.terminal import write
-from antennate.errors import FAILURES
+from antennate.errors import FAILURES, ConfigError
 from antennate.host import STOPS, give_way
-from antennate.messages import one_line
+from antennate.messages import one_line, shown
 from antennate.studies.run_files import BY_HAND
+from antennate.telemetry import LAST_DOMAIN
 from antennate.telemetry.view.channel import FAILED, IDLE, READY, Channel
 
 if TYPE_CHECKING:  # these import much, for a page that few runs want
     from antennate.studies.run_directory import RunDirectory
     from antennate.telemetry.view.foxglove import FoxgloveSink
-    from antennate.telemetry.view.process import ViewProcess
-    from antennate.telemetry.view.show import Page
+    from antennate.telemetry.view.process import Place, ViewProcess
+    from antennate.telemetry.view.ros import RosSink
+    from antennate.telemetry.view.show import Display, Page
     from antennate.telemetry.view.simulation import SimulationView
 
 MODULE = "antennate.cli.pages"
 """What Python runs as the process of a page."""
 _NONE = "-"
+_DOMAIN = "ROS_DOMAIN_ID"
+"""Variable of the environment in which ROS 2 finds the number of its domain."""
 
 
-def page_of(options: PageOptions, idle: bool = False) -> ViewProcess | None:
+def place_of(options: LiveOptions, accept: bool = False) -> Place | None:
+    """Where topics of ROS 2 are wanted, None if they are not.
+
+    Args:
+        options: What is wanted.
+        accept: Whether goals of joints are taken.
+    """
+    if not options.ros:
+        return None
+    from antennate.telemetry.view.process import Place
+
+    domain = options.ros_domain
+    if domain is None:
+        text = os.environ.get(_DOMAIN) or "0"
+        domain = int(text) if text.isascii() and text.isdigit() else LAST_DOMAIN + 1
+        if domain > LAST_DOMAIN:
+            raise ConfigError(
+                f"{_DOMAIN}: expected a number from 0 to {LAST_DOMAIN}, found {shown(text)}"
+            )
+    return Place(domain, options.ros_network, accept)
+
+
+def page_of(options: PageOptions, idle: bool = False, accept: bool = False) -> ViewProcess | None:
     """The process of the page that is wanted, None of none; it is to be closed.
 
     Args:
         options: What is wanted.
         idle: Whether it gives way to everything else, as beside a loop in real time.
+        accept: Whether goals of joints are taken from ROS 2.
     """
-    foxglove = options.port_for_foxglove
-    if not options.view and foxglove is None:
+    if not options.is_shown:
         return None
     from antennate.telemetry.view.process import ViewProcess
 
     port = options.view_port if options.view else None
-    return ViewProcess(port, MODULE, foxglove, on_lost=lambda line: write(f"{line}\n"), idle=idle)
+    return ViewProcess(
+        port,
+        MODULE,
+        options.port_for_foxglove,
+        on_lost=lambda line: write(f"{line}\n"),
+        idle=idle,
+        ros=place_of(options, accept),
+    )
 
 
 @contextlib.contextmanager
@@ -59,7 +93,7 @@ def view_of(options: ViewOptions) -> Iterator[SimulationView | None]:
 
     with process:
         speed, paused = options.view_speed, options.view_paused
-        yield SimulationView(process.channel, speed, paused=paused)
+        yield SimulationView(process.channel, speed, paused=paused, every=options.ros)
 
 
 def say_by_hand(lines: Sequence[str], run: RunDirectory) -> None:
@@ -82,7 +116,7 @@ def main() -> int:
             channel,
             None if page_file == _NONE else socket.socket(fileno=int(page_file)),
             None if foxglove == _NONE else int(foxglove),
-            IDLE in more,
+            more,
         )
     except FAILURES as error:
         channel.send(FAILED, one_line(str(error)).encode())
@@ -91,20 +125,24 @@ def main() -> int:
 
 
 def _serve(
-    channel: Channel, listener: socket.socket | None, foxglove: int | None, idle: bool
+    channel: Channel, listener: socket.socket | None, foxglove: int | None, more: Sequence[str]
 ) -> None:
+    from antennate.telemetry.view.process import Place
     from antennate.telemetry.view.show import run
 
-    displays: list[Page | FoxgloveSink] = []
+    displays: list[Display] = []
+    ros = Place.of(more)
     with contextlib.ExitStack() as stack:
         if foxglove is not None:
             displays.append(_sink(foxglove))
+        if ros is not None:
+            displays.append(_topics(ros, channel))
         if listener is not None:
             displays.append(_page(channel, listener, stack))
-        if idle:
+        if IDLE in more:
             give_way()
         channel.send(READY)
-        run(channel, displays)
+        run(channel, displays, prompt=ros is not None)
 
 
 def _sink(port: int) -> FoxgloveSink:
@@ -112,6 +150,16 @@ def _sink(port: int) -> FoxgloveSink:
 
     sink = FoxgloveSink(port)
     write(f"foxglove: {sink.address}, layout {layout()}; it does not check who reads it\n")
+    return sink
+
+
+def _topics(place: Place, channel: Channel) -> RosSink:
+    from antennate.telemetry.view.ros import GOAL_TOPIC, RosSink
+
+    sink = RosSink(place, channel, lambda line: write(f"{line}\n"))
+    where = f"domain {place.domain} {'of the network' if place.network else 'on this computer'}"
+    goals = f"; goals of joints are taken from {GOAL_TOPIC}" if place.accept else ""
+    write(f"ros: topics in {where}, which does not check who reads them{goals}\n")
     return sink
 
 

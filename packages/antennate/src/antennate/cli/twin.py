@@ -151,7 +151,7 @@ def _serve_robot(config: TwinConfig, places: Places, orders: Orders | None) -> i
         if places.robot_toml is not None:
             _write_robot(places.robot_toml, config.robot, server.paths)
         if page is not None:
-            recording.watchers.append(_shown(page, robot, config))
+            recording.watchers.append(_shown(page, robot, config, every=places.ros))
         recording.begin(passage, config)
         try:
             with urgent(LEVEL + 1) if real else nullcontext():
@@ -214,11 +214,13 @@ def _watch(
     robot.on_return, passage.on_tick = returned, tick
 
 
-def _shown(page: ViewProcess, robot: TwinRobot, config: TwinConfig) -> Callable[[World], None]:
+def _shown(
+    page: ViewProcess, robot: TwinRobot, config: TwinConfig, every: bool
+) -> Callable[[World], None]:
     """What shows the twin after each tick; it serves in real time, so a page cannot stop it."""
     from antennate.telemetry.view.simulation import SimulationView  # imports much
 
-    view = SimulationView(page.channel, steered=False)
+    view = SimulationView(page.channel, steered=False, every=every)
     view.begin(f"twin, trial {config.trial}")
 
     def show(world: World) -> None:

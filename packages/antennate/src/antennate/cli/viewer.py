@@ -39,7 +39,7 @@ from antennate.types import Maneuver, State
 
 MODULE = "antennate.cli.viewer"
 """What Python runs as the process beside a drive."""
-REQUIRED, PAGE = "required", "page="
+REQUIRED, EVERY, PAGE = "required", "every", "page="
 _STDOUT = 1
 _BEFORE = re.compile(r"(HOLD|FAULT|OFF) (?!NOT_READY|UNKNOWN_CONTACT|UNDECIDED)")
 """A cause that is also shown while the robot is not armed."""
@@ -95,10 +95,11 @@ class _Page:
     Args:
         file: Number of the file that leads there.
         folder: That of the results.
+        every: Whether it gets each tick, and not those of pictures alone.
     """
 
-    def __init__(self, file: int, folder: Path) -> None:
-        self._folder = folder
+    def __init__(self, file: int, folder: Path, every: bool) -> None:
+        self._folder, self._every = folder, every
         self._channel = Channel(socket.socket(fileno=file))
         self._due = -math.inf
 
@@ -112,9 +113,9 @@ class _Page:
             self._channel.send(HEADER, first.content)
 
     def show(self, message: Message) -> None:
-        """A tick, if a picture is due."""
+        """A tick, if it is wanted."""
         now = time.monotonic()
-        if now >= self._due:
+        if self._every or now >= self._due:
             self._due = now + 1.0 / RATE
             self._channel.send(TICK, message.content)
 
@@ -193,7 +194,7 @@ def main() -> int:
     """Keep and show ticks until they end; 0 if all of them are kept.
 
     With the word `required` after the log's path it ends with the log, and shows nothing more. With
-    `page=NUMBER` it sends them on to the file of that number.
+    `page=NUMBER` it sends them on to the file of that number, with `every` each of them.
     """
     for number in (*STOPS, signal.SIGTTOU):  # the other end decides when it is over
         signal.signal(number, signal.SIG_IGN)
@@ -201,7 +202,8 @@ def main() -> int:
     required = REQUIRED in sys.argv[2:]
     log = _Log(Path(sys.argv[1]), required)
     files = [int(word.removeprefix(PAGE)) for word in sys.argv[2:] if word.startswith(PAGE)]
-    page = _Page(files[0], Path(sys.argv[1]).parent) if files else None
+    every = EVERY in sys.argv[2:]
+    page = _Page(files[0], Path(sys.argv[1]).parent, every) if files else None
     stream = messages(sys.stdin.buffer.raw, log.settle)  # type: ignore[attr-defined]
     try:
         first = next(stream, None)
@@ -266,6 +268,8 @@ def sentences(result: Mapping[str, Any]) -> str:
     causes = f"{result['refusal']}; {result['why']}" if held or failed(result) else ""
     held = result.get("held")  # results of older versions have none
     last = [f"Before torque went off: {held}."] if held else []
+    if goals := result.get("goals"):
+        last.append(f"Goals of joints: {goals['taken']} taken, {goals['refused']} refused.")
     void = void_sentence({f"`{result['controller']}`": result.get("void_decisions", 0)})
     lines = [_sentence(result), void, *late_sentence(result), *what_to_do(causes), *last]
     return "\n".join(filter(None, lines))

@@ -10,7 +10,14 @@ from pydantic import field_validator, model_validator
 
 from antennate.antenna.calibration import Calibration
 from antennate.control.readers import SIMULATION_ALONE, UNDRIVEN, unused
-from antennate.control.registry import BUILT_IN, TELEOP, check_for_robots, unread, unread_by_all
+from antennate.control.registry import (
+    BUILT_IN,
+    GOALS,
+    TELEOP,
+    check_for_robots,
+    unread,
+    unread_by_all,
+)
 from antennate.errors import ConfigError
 from antennate.hardware.esp32.wire import names_board
 from antennate.hardware.safety import deadlines
@@ -20,6 +27,7 @@ from antennate.params.control import ConditioningParams, ControlParams
 from antennate.params.hardware import (
     DeadManParams,
     DoctorParams,
+    GoalsParams,
     JogParams,
     NetworkParams,
     PortsParams,
@@ -201,6 +209,7 @@ class DriveConfig(RobotConfig):
     """Walk only while a key of the terminal is held."""
     dead_man: DeadManParams = DeadManParams()
     drift: DriftParams = DriftParams()
+    goals: GoalsParams = GoalsParams()
     fault_time: float = number(
         10.0, "s", "assumed: long enough to take hold of the robot", ge=0, le=600
     )
@@ -285,6 +294,7 @@ class TeleopConfig(DriveConfig):
     unread: ClassVar[tuple[str, ...]] = (
         *DriveConfig.unread,
         "controller",
+        "goals.release",
         *paths_of(DeadManParams, "dead_man"),
         *(f"control.{path}" for path in sorted(unread(TELEOP, ControlParams()))),
     )
@@ -294,6 +304,21 @@ class TeleopConfig(DriveConfig):
     def reader(self) -> str:
         """What reads the numbers of the control."""
         return TELEOP
+
+
+class GoalsConfig(DriveConfig):
+    """The configuration of `drive --accept`; `controller` is not used."""
+
+    unread: ClassVar[tuple[str, ...]] = (
+        *DriveConfig.unread,
+        "controller",
+        *(f"control.{path}" for path in sorted(unread(GOALS, ControlParams()))),
+    )
+
+    @property
+    def reader(self) -> str:
+        """What reads the numbers of the control."""
+        return GOALS
 
 
 class RobotFile(DriveConfig):

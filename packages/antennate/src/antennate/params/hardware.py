@@ -101,6 +101,20 @@ class TeleopParams(Params):
     """Oscillations of the antenna bases per second."""
 
 
+class GoalsParams(Params):
+    """How a robot walks by goals of its joints."""
+
+    release: float = number(
+        0.2,
+        "s",
+        "assumed: a program that sends at 100 Hz leaves out 20 in a row",
+        needs=["--accept"],
+        gt=0,
+        le=2,
+    )
+    """Time without goals after which the robot stands."""
+
+
 class DoctorParams(Params):
     """How long is looked, and from where on something is not good."""
 

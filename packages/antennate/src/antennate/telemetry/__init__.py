@@ -8,6 +8,8 @@ PAGE_PORT = 8777
 """Usual port of the page (assumed: nothing known uses it)."""
 FOXGLOVE_PORT = 8765
 """Usual port of the WebSocket of Foxglove."""
+LAST_DOMAIN = 232
+"""Largest number of a domain of ROS 2: ports of the next one would be beyond 65535."""
 
 
 class Restart(Exception):

@@ -309,13 +309,15 @@ def decided(controller: Controller, decision: Decision, frame: AntennaFrame) -> 
         "contact": decision.contact,
         "maneuver": decision.maneuver,
         "phase": phase[0] if len(phase) == 1 else math.nan,
-        **{name: tuple(getattr(frame, name)[0].tolist()) for name in _felt(frame)},
+        **felt(frame),
     }
 
 
-def _felt(frame: AntennaFrame) -> tuple[str, ...]:
+def felt(frame: AntennaFrame | None) -> dict[str, tuple[float, ...]]:
     """What an inertial sensor gives, if the frame of one robot holds any."""
-    return MOTION if frame.angular_velocity.size else ()
+    if frame is None or not frame.angular_velocity.size:
+        return {}
+    return {name: tuple(getattr(frame, name)[0].tolist()) for name in MOTION}
 
 
 def numbers_of(owner: Any, name: str) -> tuple[float, ...]:

@@ -104,12 +104,13 @@ string function
 uint32 line
 """
 _RULE = "=" * 80
-_TIME = f"""\
+TIME_SCHEMA = f"""\
 {_RULE}
 MSG: builtin_interfaces/Time
 int32 sec
 uint32 nanosec
 """
+"""Definition of a time, as it stands behind those that use it."""
 _STATE_SCHEMA = f"""\
 std_msgs/Header header
 string[] name
@@ -120,7 +121,7 @@ float64[] effort    # [N m]; empty where it is not measured
 MSG: std_msgs/Header
 builtin_interfaces/Time stamp
 string frame_id
-{_TIME}"""
+{TIME_SCHEMA}"""
 _IMU_SCHEMA = f"""\
 std_msgs/Header header
 geometry_msgs/Quaternion orientation
@@ -133,7 +134,7 @@ float64[9] linear_acceleration_covariance
 MSG: std_msgs/Header
 builtin_interfaces/Time stamp
 string frame_id
-{_TIME}{_RULE}
+{TIME_SCHEMA}{_RULE}
 MSG: geometry_msgs/Quaternion
 float64 x
 float64 y
@@ -153,7 +154,7 @@ string msg
 string file
 string function
 uint32 line
-{_TIME}"""
+{TIME_SCHEMA}"""
 
 
 def _own(name: str, fields: str) -> MessageType:

@@ -18,22 +18,12 @@ from antennate.errors import BadInputError
 from antennate.lookup import require_package
 from antennate.sim import shapes
 from antennate.sim.shapes import Shapes, picture
-from antennate.telemetry.header import Header
-from antennate.telemetry.ticks import Tick
-from antennate.telemetry.topics import CONFIG, EVENTS, TOPICS, Topic
-from antennate.telemetry.view.channel import (
-    HEADER,
-    POSES,
-    SCENE,
-    SNAPSHOT,
-    TEXT,
-    TICK,
-    Poses,
-)
+from antennate.telemetry.topics import TOPICS
+from antennate.telemetry.view.channel import POSES, SCENE, SNAPSHOT, Poses
+from antennate.telemetry.view.live import LiveTopics
 
 _HOST = "127.0.0.1"
 _IDLE = 0.1
-_INFO = 20
 _ARROW = (0.05, 0.003, 0.01, 0.008)
 """Length for 1 N [m], diameter of the shaft, length and diameter of the head [m]."""
 
@@ -78,8 +68,7 @@ class FoxgloveSink:
         self._scene_channel = import_module("foxglove.channels").SceneUpdateChannel(
             "/scene", context=context
         )
-        self._names: tuple[str, ...] = ()
-        self._start = self._now = 0
+        self._topics = LiveTopics()
         self._shapes: Shapes | None = None
 
     @property
@@ -96,30 +85,15 @@ class FoxgloveSink:
 
     def take(self, kind: bytes, content: bytes) -> None:
         """Send a message on."""
-        if kind == TICK:
-            tick = Tick.unpack(content)
-            self._now = max(0, self._start + round(1e9 * tick.now))
-            for topic, data in tick.messages(self._names, self._now):
-                self._send(topic, data)
-        elif kind == POSES and self._shapes is not None:
+        for topic, data in self._topics.messages(kind, content):
+            self._channels[topic].log(data, log_time=self._topics.now)
+        if kind == POSES and self._shapes is not None:
             self._scene(self._shapes, Poses.unpack(content))
         elif kind == SNAPSHOT and self._shapes is not None:
             if (now := picture(content, self._shapes)) is not None:
                 self._scene(self._shapes, Poses(*now))
         elif kind == SCENE:
             self._shapes = Shapes.unpack(content)
-        elif kind == TEXT:
-            time = divmod(self._now, 10**9)
-            text = content.decode("utf-8", "replace")
-            self._send(EVENTS, EVENTS.type.encode(*time, _INFO, "antennate", text, "", "", 0))
-        elif kind == HEADER:
-            header = Header.unpack(content)
-            self._names, self._start = header.robot.joint_names, header.start
-            self._now = header.start
-            self._send(CONFIG, header.messages()[CONFIG])
-
-    def _send(self, topic: Topic, data: bytes) -> None:
-        self._channels[topic].log(data, log_time=self._now)
 
     def _scene(self, what: Shapes, now: Poses) -> None:
         made = self._messages
@@ -137,7 +111,8 @@ class FoxgloveSink:
             shape = make(pose=poses[i], size=_vector(made, full), color=colours[i], **more)
             entity[name].append(shape)
         arrows = [_arrow(made, each) for each in now.forces if each[3:].any()]
-        stamp = made.Timestamp(sec=self._now // 10**9, nsec=self._now % 10**9)
+        time = self._topics.now
+        stamp = made.Timestamp(sec=time // 10**9, nsec=time % 10**9)
         self._scene_channel.log(
             made.SceneUpdate(
                 entities=[
@@ -146,7 +121,7 @@ class FoxgloveSink:
                     )
                 ]
             ),
-            log_time=self._now,
+            log_time=time,
         )
 
 

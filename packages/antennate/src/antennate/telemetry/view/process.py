@@ -8,16 +8,46 @@ import socket
 import subprocess
 import sys
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
 
 from antennate.errors import BadInputError, WorkerError, reason
 from antennate.lookup import require_package
 from antennate.telemetry.view.channel import END, FAILED, IDLE, READY, Channel
 
 HOST = "127.0.0.1"
+_ROS = "ros="
 _STARTING = 60.0
 """Longest wait for the process to serve [s]: its imports on a busy machine; assumed."""
 _ENDING = 2.0
+
+
+class Place(NamedTuple):
+    """Where topics of ROS 2 are.
+
+    Attributes:
+        domain: Number of the domain.
+        network: Whether other computers may read along.
+        accept: Whether goals of joints are taken.
+    """
+
+    domain: int
+    network: bool = False
+    accept: bool = False
+
+    @property
+    def word(self) -> str:
+        """One word of all of it."""
+        return f"{_ROS}{','.join(str(int(each)) for each in self)}"
+
+    @classmethod
+    def of(cls, words: Sequence[str]) -> Place | None:
+        """The place that one of these words says, None if none does."""
+        for word in words:
+            if word.startswith(_ROS):
+                domain, network, accept = map(int, word.removeprefix(_ROS).split(","))
+                return cls(domain, bool(network), bool(accept))
+        return None
 
 
 class ViewProcess:
@@ -26,11 +56,13 @@ class ViewProcess:
     Args:
         port: Port of the page on this computer, 0 for any that is free; None without a page.
         module: What that process runs; its words are the files of the channel and of the page's
-            socket, and the port for Foxglove, a hyphen for what is not wanted.
+            socket, and the port for Foxglove, a hyphen for what is not wanted; then the words for
+            `ros` and `idle`.
         foxglove: Port for Foxglove likewise, None without it.
         flag: The option that chooses the port of the page, for an error.
         on_lost: Called, in a thread of its own, with a line if it ends although nobody told it to.
         idle: Whether it gets a core only while nothing else wants one, once it serves.
+        ros: Where topics of ROS 2 are, None without them.
 
     Attributes:
         channel: To it.
@@ -45,11 +77,14 @@ class ViewProcess:
         flag: str = "--view-port",
         on_lost: Callable[[str], None] = lambda line: None,
         idle: bool = False,
+        ros: Place | None = None,
     ) -> None:
         if port is not None:
             require_package("viser", "view")
         if foxglove is not None:
             require_package("foxglove", "foxglove", package="foxglove-sdk")
+        if ros is not None:
+            require_package("cyclonedds", "ros")
         if port is not None and port == foxglove != 0:
             raise BadInputError(
                 f"view: expected different ports for the page and for Foxglove, found "
@@ -62,6 +97,7 @@ class ViewProcess:
             files = [far.fileno()] + ([] if port is None else [listener.fileno()])
             words = [*map(str, files), *(["-"] if port is None else [])]
             words.append("-" if foxglove is None else str(foxglove))
+            words += [] if ros is None else [ros.word]
             words += [IDLE] if idle else []
             self._process = subprocess.Popen(  # noqa: S603 our own words
                 [sys.executable, "-m", module, *words],
@@ -76,7 +112,7 @@ class ViewProcess:
         except BaseException:
             self.close()
             raise
-        self._name = "foxglove" if port is None else "view"
+        self._name = "view" if port is not None else "foxglove" if ros is None else "ros"
         threading.Thread(target=self._watch, args=(on_lost,), daemon=True).start()
 
     def _wait(self) -> None:

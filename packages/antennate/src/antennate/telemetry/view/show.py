@@ -7,10 +7,11 @@ from __future__ import annotations
 
 import html
 import math
+import select
 import time
 from collections import deque
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 import viser
@@ -33,7 +34,6 @@ from antennate.telemetry.view.channel import (
     read,
 )
 from antennate.telemetry.view.charts import LABELS, Charts, Map
-from antennate.telemetry.view.foxglove import FoxgloveSink
 from antennate.telemetry.view.pace import RATE
 from antennate.telemetry.view.player import LogScene
 from antennate.telemetry.view.scene import Controls, SceneView
@@ -50,12 +50,37 @@ _SIDES = (rgba(SERIES[0]), rgba(SERIES[1]))
 _COUNTERS = ("missed", "frames", "crc", "lost", "misses", "stale", "sent", "refused")
 
 
-def run(channel: Channel, displays: Sequence[Page | FoxgloveSink]) -> None:
-    """Show what comes until the program has ended, and that it has."""
+class Display(Protocol):
+    """What shows messages of the channel."""
+
+    def draw(self, now: float) -> float:
+        """Draw what is due at a time [s]; the time until more may be due [s]."""
+        ...
+
+    def take(self, kind: bytes, content: bytes) -> None:
+        """Take a message."""
+        ...
+
+    def end(self) -> None:
+        """Show that the program has ended."""
+        ...
+
+
+def run(channel: Channel, displays: Sequence[Display], prompt: bool = False) -> None:
+    """Show what comes until the program has ended, and that it has.
+
+    Args:
+        channel: Where it comes from.
+        displays: What shows it.
+        prompt: Whether it is shown as it comes, which costs the program time; else at pictures.
+    """
     ended = False
     while not (ended or channel.closed):
         wait = min(each.draw(time.monotonic()) for each in displays)
-        time.sleep(min(wait, 1.0 / RATE))  # waking up for each message would cost the program time
+        if prompt:
+            select.select((channel,), (), (), wait)
+        else:
+            time.sleep(min(wait, 1.0 / RATE))
         for kind, content in channel.receive():
             if ended := kind == END:
                 break

@@ -8,16 +8,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 from antennate.control.registry import make_controller
 from antennate.figures import SERIES, rgba
 from antennate.params.control import ControlParams
 from antennate.robots.spec import RobotSpec
+from antennate.sim.frames import LinkFrames
 from antennate.sim.shapes import VisibleModel, snapshot
 from antennate.telemetry import Restart
-from antennate.telemetry.ticks import Tick, numbers_of
-from antennate.telemetry.view.channel import SCENE, SNAPSHOT, TICK, Channel
+from antennate.telemetry.ticks import Tick, felt, numbers_of
+from antennate.telemetry.view.channel import LINKS, PLACES, SCENE, SNAPSHOT, TICK, Channel
 from antennate.telemetry.view.pace import Pace, Tuning
 from antennate.types import AntennaFrame, Contact, Controller
 
@@ -37,13 +39,19 @@ class SimulationView(Pace):
         speed: Times real time at which it begins; 0 is as fast as it goes.
         steered: Whether the page has controls; without them it changes nothing.
         paused: Whether it stands at first.
+        every: Whether each tick is sent in real time, with joints and links of the robot.
 
     Attributes:
         results: The folder that is to hold the results, empty if there is none.
     """
 
     def __init__(
-        self, channel: Channel, speed: float = 1.0, steered: bool = True, paused: bool = False
+        self,
+        channel: Channel,
+        speed: float = 1.0,
+        steered: bool = True,
+        paused: bool = False,
+        every: bool = False,
     ) -> None:
         super().__init__(channel, speed)
         self.state["paused"] = paused
@@ -54,6 +62,8 @@ class SimulationView(Pace):
         self._fresh: list[str] = []
         self._seen: Any = None
         self._model: VisibleModel | None = None
+        self._every = every
+        self._frames: LinkFrames | None = None
         self._data: Any = None
         self._title, self._number = "", 0
         self._last: tuple[AntennaFrame | None, Controller | None, int] = (None, None, NONE)
@@ -104,20 +114,33 @@ class SimulationView(Pace):
             self._seen, self._model = model, VisibleModel(model, _SIDES)
             self.tell()
             self.channel.send_whole(SCENE, self._model.shapes().pack())
+            if self._every:
+                self._frames = LinkFrames(model)
+                self.channel.send(LINKS, self._frames.links.pack())
         elif self.idle:
             return ()
         self._data, self._last = data, (frame, controller, maneuver)
         self.wait(data.time)
         if self.due():
             self.redraw()
+        elif self._frames is not None:
+            self.channel.send_together(*self._now(self._frames))
         done, self._fresh = self._fresh, []
         return done
 
     def redraw(self) -> None:
         """Show where everything is."""
         if self._model is not None and self._data is not None:
-            tick = self._tick(self._data.time, *self._last)
-            self.channel.send_together((SNAPSHOT, snapshot(self._data)), (TICK, tick.pack()))
+            now = (SNAPSHOT, snapshot(self._data))
+            self.channel.send_together(now, *self._now(self._frames))
+
+    def _now(self, frames: LinkFrames | None) -> list[tuple[bytes, bytes]]:
+        """Messages of this tick, with joints and links where they are wanted."""
+        tick = self._tick(self._data.time, *self._last)
+        if frames is None:
+            return [(TICK, tick.pack())]
+        tick = replace(tick, **frames.joints(self._data))
+        return [(TICK, tick.pack()), (PLACES, frames.places(self._data))]
 
     def _tick(
         self, t: float, frame: AntennaFrame | None, controller: Controller | None, maneuver: int
@@ -138,6 +161,7 @@ class SimulationView(Pace):
             maneuver=maneuver,
             phase=phase[0] if len(phase) == 1 else math.nan,
             angles=(),
+            **felt(frame),
         )
 
     def look(self) -> None:
