@@ -114,6 +114,7 @@ OPTIONAL = {
     "tests/test_foxglove.py": "foxglove",
     "tests/test_pages.py": "websockets",
     "tests/test_policies.py": "onnx",
+    "tests/test_ros.py": "cyclonedds",
     "tests/test_training.py": "gymnasium",
     "tests/test_view.py": "viser",
     "tests/test_view_charts.py": "viser",

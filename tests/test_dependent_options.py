@@ -14,12 +14,16 @@ from antennate.cli.options import Option
 from antennate.errors import ConfigError
 
 NEEDS = {
+    "--accept": ["--ros"],
     "--foxglove-port": ["--foxglove"],
     "--gait": ["--export mjcf"],
+    "--goals.release": ["--accept"],
     "--key": ["--udp"],
     "--overwrite": ["--out"],
     "--resume": ["--out"],
     "--retry": ["--out"],
+    "--ros-domain": ["--ros"],
+    "--ros-network": ["--ros"],
     "--scene": ["--export mjcf"],
     "--seed": ["--scene"],
     "--slurm": ["--engine slurm"],
@@ -28,7 +32,7 @@ NEEDS = {
     "--video-view": ["--video"],
     "--view-paused": ["--view"],
     "--view-port": ["--view"],
-    "--view-speed": ["--view", "--foxglove"],
+    "--view-speed": ["--view", "--foxglove", "--ros"],
     "--yes": ["--fix"],
 }
 """What stands for nothing alone; `--overwrite` of `log` has a file of its own, and with `--key` of
