@@ -25,7 +25,7 @@ SHARED = "[Options of a run](commands.md#options-of-a-run): "
 SETS = {
     "results": "--out --overwrite --json",
     "trials": "--workers --resume --retry --engine --slurm --shard --trial-timeout",
-    "page": "--view --view-port --foxglove --foxglove-port",
+    "page": "--view --view-port --foxglove --foxglove-port --ros --ros-domain --ros-network",
     "pace": "--view-paused --view-speed",
     "board": "--esp32 --key --insecure-udp",
     "curves": "--calibration --calibration-right --sensor-id --sensor-id-right --reach "

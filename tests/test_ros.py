@@ -228,18 +228,15 @@ def test_a_client_reads_joints_a_hundred_times_a_second(tmp_path: Path) -> None:
     assert (end["commands_sent"], end["unlogged"]) == (0, 0)
     assert "goals" not in end
     with LogReader(tmp_path / "run" / "drive.mcap") as log:
-        start = log.header.start
-        angles = {start + round(1e9 * one.now): one.positions for one in log}
-    stamps = [1e-9 * stamp for stamp in sorted(angles)]
-    first, last = (int(np.argmin(np.abs(np.array(stamps) - lines[i][0]))) for i in (0, -1))
-    assert last - first > 200
-    assert len(lines) >= 0.95 * (last - first + 1)
-    by_time = {
-        round(1e5 * stamp): value for stamp, value in zip(stamps, angles.values(), strict=True)
-    }
-    for t, _, names, positions in lines:
+        found = [(1e-9 * log.header.start + one.now, one.positions) for one in log]
+    stamps, angles = np.array([t for t, _ in found]), [a for _, a in found]
+    logged = [int(np.argmin(np.abs(stamps - t))) for t, *_ in lines]
+    assert logged[-1] - logged[0] > 200
+    assert len(lines) >= 0.95 * (logged[-1] - logged[0] + 1)
+    for number, (t, _, names, positions) in zip(logged, lines, strict=True):
+        assert t == pytest.approx(stamps[number], abs=1e-5)
         assert tuple(names) == NAMES
-        np.testing.assert_array_equal(positions, by_time[round(1e5 * t)])
+        np.testing.assert_array_equal(positions, angles[number])
 
 
 @pytest.mark.ci
@@ -312,5 +309,5 @@ def test_a_simulation_publishes_its_joints(tmp_path: Path) -> None:
     assert len(lines) > 50
     stamps = np.array([line[0] for line in lines])
     assert np.median(np.diff(stamps)) == pytest.approx(0.01, abs=1e-6)
-    assert tuple(lines[-1][2]) == NAMES
+    assert set(lines[-1][2]) == set(NAMES)
     assert np.ptp([line[3] for line in lines], axis=0).max() > 0.5  # legs turn
