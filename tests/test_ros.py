@@ -151,15 +151,15 @@ def test_goals_of_this_robot_are_taken_and_rubbish_is_counted(
     for number, message in enumerate([*rubbish(), beyond, endless, twice], 1):
 
         def refused(message: Any = message, number: int = number) -> bool:
-            if goals.refused < number:
+            if goals.counts["refused"] < number:
                 writer.write(message)
                 time.sleep(0.02)
             sink.draw(0.0)
             assert goals.newest() is None
-            return goals.refused >= number
+            return goals.counts["refused"] >= number
 
         until(refused)
-    assert goals.taken == 0
+    assert goals.counts["taken"] == 0
     angles = np.linspace(-0.2, 0.2, len(NAMES)).tolist()
 
     def came() -> Any:

@@ -41,13 +41,12 @@ from antennate.telemetry.feed import Feed
 from antennate.telemetry.header import Header, part, parts
 from antennate.telemetry.reader import count
 from antennate.telemetry.ticks import Tick
+from antennate.telemetry.view.goals import ReceivedGoals
 from antennate.types import Controller
 
 if TYPE_CHECKING:
-    from antennate.telemetry.view.goals import ReceivedGoals
     from antennate.telemetry.view.process import ViewProcess
 
-_Made = Callable[[Session, DriveConfig, "ReceivedGoals | None"], tuple[str, Controller]]
 _LONGEST_DRAWN = 12_000
 """Most ticks of a log that is drawn for the report: it takes some four seconds."""
 
@@ -79,17 +78,11 @@ TELEOP_VIEW = dataclasses.replace(
 
 
 @dataclass(frozen=True)
-class WalkOptions(ResultOptions, PortOptions, PageOptions):
+class DriveOptions(ResultOptions, PortOptions, PageOptions):
     """Whether to move."""
 
     arm: bool = option(False, "torque on after the dry run")
     until: Path | None = option(None, "end once this file exists, as of a light gate", "FILE")
-
-
-@dataclass(frozen=True)
-class DriveOptions(WalkOptions):
-    """Whether to move, and by whom."""
-
     accept: bool = option(
         False, "walk by goals of joints from ROS 2, in place of a controller", needs=["--ros"]
     )
@@ -100,21 +93,10 @@ def command(argv: Sequence[str]) -> int:
     model = GoalsConfig if "--accept" in argv else DriveConfig
     config, options = parse_robot("drive", DESCRIPTION, model, argv, DriveOptions)
     require_antennae(config.robot, "drive")
-    return _walk(VIEW, config, options, argv, _by_goals if options.accept else None)
+    return _walk(VIEW, config, options, argv)
 
 
-def _by_goals(
-    session: Session, config: DriveConfig, received: ReceivedGoals | None
-) -> tuple[str, Controller]:
-    """The controller by goals, and its name in the log."""
-    if received is None:
-        raise ConfigError("--accept: expected --ros beside it, found none")
-    control, robot = config.control, config.robot
-    newest, now = received.newest, session.clock.now
-    return "goals", GoalController(control, robot, config.goals, newest, now)
-
-
-def _require_robot(config: DriveConfig, options: WalkOptions) -> None:
+def _require_robot(config: DriveConfig, options: DriveOptions) -> None:
     """Refuse to arm a robot whose zeros are not known, and ports that are none."""
     if options.arm and (lack := zeros_lack(config.robot, config.zeros)):
         raise ConfigError(f"--arm: {lack}")
@@ -127,9 +109,9 @@ def _require_robot(config: DriveConfig, options: WalkOptions) -> None:
 def _walk(
     view: View,
     config: DriveConfig,
-    options: WalkOptions,
+    options: DriveOptions,
     argv: Sequence[str],
-    controller: _Made | None = None,
+    controller: Callable[[Session, DriveConfig], Controller] | None = None,
 ) -> int:
     """Drive by the controller that is named, or by another one: the exit code.
 
@@ -138,14 +120,14 @@ def _walk(
         config: The robot, and for how long.
         options: Where it is, and whether it moves.
         argv: The words of the command.
-        controller: Makes the controller and its name in the log once the session is there; None for
-            the one that is named.
+        controller: Makes the controller once the session is there; None for the one that is named.
     """
     _require_robot(config, options)
     given, config = config, config.calibrated()
-    key, accept = key_of(options), isinstance(options, DriveOptions) and options.accept
+    key = key_of(options)
     with (
-        page_of(options, idle=not accept, accept=accept) or contextlib.nullcontext() as page,
+        page_of(options, idle=not options.accept, accept=options.accept)
+        or contextlib.nullcontext() as page,
         _operator(config, options) as operator,
         folder_for(view, options, config, argv) as folder,
     ):
@@ -154,10 +136,15 @@ def _walk(
         with connect(config, options.esp32, options.bus, key) as session:
             if operator.stop is not None:
                 operator.stop.closed = True  # until the first tick: from here on there is a result
-            received = _received(page) if accept else None
-            if controller is not None:
-                name, session.control.controller = controller(session, config, received)
-                config = config.model_copy(update={"controller": name})
+            goals = ReceivedGoals(page.channel) if page is not None and options.accept else None
+            if goals is not None:
+                control, robot, now = config.control, config.robot, session.clock.now
+                made = GoalController(control, robot, config.goals, goals.newest, now)
+                session.control.controller = made
+                config = config.model_copy(update={"controller": "goals"})
+            elif controller is not None:
+                session.control.controller = controller(session, config)
+                config = config.model_copy(update={"controller": view.name})
             header = Header(
                 controller=config.controller,
                 params=config.control,
@@ -169,14 +156,15 @@ def _walk(
             log = folder.path / LOG
             record = _Record(header, log, config.record_required, file, options.ros)
             result = _carry_out(view.name, config, session, options, record, operator, page)
-            if received is not None:
-                result["goals"] = {"taken": received.taken, "refused": received.refused}
+            if goals is not None:
+                result["goals"] = goals.counts
         try:
             folder.finish(result, ())
         finally:  # the robot's state is told even if it cannot be kept
             log = folder.path / (result["logs"] or [LOG])[0]
-            words = [] if controller is None else ["--controller", "open"]
-            if config.controller not in BUILT_IN and controller is None:
+            own = controller is not None or goals is not None
+            words = ["--controller", "open"] if own else []
+            if config.controller not in BUILT_IN and not own:
                 words = ["--controller", config.controller]
             _show(result, options, typed("replay", str(log), *words))
         ticks = 0 if result["pace"] is None else result["pace"]["ticks"]
@@ -190,16 +178,7 @@ def _walk(
     return BAD_INPUT if viewer.failed(result) or result["log_cut"] else OK
 
 
-def _received(page: ViewProcess | None) -> ReceivedGoals | None:
-    """Goals that the process of the topics passes on."""
-    if page is None:
-        return None
-    from antennate.telemetry.view.goals import ReceivedGoals  # for few drives
-
-    return ReceivedGoals(page.channel)
-
-
-def _show(result: Mapping[str, Any], options: WalkOptions, replay: str) -> None:
+def _show(result: Mapping[str, Any], options: DriveOptions, replay: str) -> None:
     """Table and sentences; `replay` is the command that reads the log."""
     again = f"What was read and decided: {replay}"
     if not result["logs"]:
@@ -247,7 +226,7 @@ def _carry_out(
     command: str,
     config: DriveConfig,
     session: Session,
-    options: WalkOptions,
+    options: DriveOptions,
     record: _Record,
     operator: Operator,
     page: ViewProcess | None,
@@ -293,7 +272,7 @@ def _carry_out(
 
 
 @contextlib.contextmanager
-def _operator(config: DriveConfig, options: WalkOptions) -> Iterator[Operator]:
+def _operator(config: DriveConfig, options: DriveOptions) -> Iterator[Operator]:
     """Who may stop the drive: signals, a key that is let go, a file that comes."""
     with contextlib.ExitStack() as stack:
         stop = stack.enter_context(StopOnce(last=True))
@@ -311,7 +290,7 @@ def _operator(config: DriveConfig, options: WalkOptions) -> Iterator[Operator]:
 
 
 @dataclass(frozen=True)
-class TeleopOptions(WalkOptions):
+class TeleopOptions(DriveOptions):
     """Whether to move, and by what."""
 
     gamepad: Path | None = option(None, "gamepad in place of keys, as /dev/input/js0", "FILE")
@@ -319,7 +298,9 @@ class TeleopOptions(WalkOptions):
 
 def teleop(argv: Sequence[str]) -> int:
     """Walk by keys until q, the duration is over or it is stopped."""
-    config, options = parse_robot("teleop", TELEOP_DESCRIPTION, TeleopConfig, argv, TeleopOptions)
+    config, options = parse_robot(
+        "teleop", TELEOP_DESCRIPTION, TeleopConfig, argv, TeleopOptions, without=("accept",)
+    )
     if config.hold_to_run:
         raise ConfigError(
             "--hold-to-run: expected none with teleop, which stands without a key, found it"
@@ -328,12 +309,9 @@ def teleop(argv: Sequence[str]) -> int:
     _require_robot(config, options)
     with _keys(options.gamepad, config.teleop.gamepad_silence) as keys:
 
-        def controller(
-            session: Session, calibrated: DriveConfig, received: ReceivedGoals | None
-        ) -> tuple[str, Controller]:
+        def controller(session: Session, calibrated: DriveConfig) -> KeyController:
             control, robot = calibrated.control, calibrated.robot
-            by_keys = KeyController(control, robot, config.teleop, keys, session.clock.now)
-            return TELEOP_VIEW.name, by_keys
+            return KeyController(control, robot, config.teleop, keys, session.clock.now)
 
         return _walk(TELEOP_VIEW, config, options, argv, controller)
 

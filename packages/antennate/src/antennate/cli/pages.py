@@ -7,9 +7,11 @@ from __future__ import annotations
 
 import contextlib
 import os
+import select
 import signal
 import socket
 import sys
+import time
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
@@ -20,14 +22,15 @@ from antennate.host import STOPS, give_way
 from antennate.messages import one_line, shown
 from antennate.studies.run_files import BY_HAND
 from antennate.telemetry import LAST_DOMAIN
-from antennate.telemetry.view.channel import FAILED, IDLE, READY, Channel
+from antennate.telemetry.view.channel import END, FAILED, IDLE, READY, Channel
+from antennate.telemetry.view.pace import RATE
 
 if TYPE_CHECKING:  # these import much, for a page that few runs want
     from antennate.studies.run_directory import RunDirectory
     from antennate.telemetry.view.foxglove import FoxgloveSink
     from antennate.telemetry.view.process import Place, ViewProcess
     from antennate.telemetry.view.ros import RosSink
-    from antennate.telemetry.view.show import Display, Page
+    from antennate.telemetry.view.show import Page
     from antennate.telemetry.view.simulation import SimulationView
 
 MODULE = "antennate.cli.pages"
@@ -128,9 +131,8 @@ def _serve(
     channel: Channel, listener: socket.socket | None, foxglove: int | None, more: Sequence[str]
 ) -> None:
     from antennate.telemetry.view.process import Place
-    from antennate.telemetry.view.show import run
 
-    displays: list[Display] = []
+    displays: list[Page | FoxgloveSink | RosSink] = []
     ros = Place.of(more)
     with contextlib.ExitStack() as stack:
         if foxglove is not None:
@@ -142,7 +144,30 @@ def _serve(
         if IDLE in more:
             give_way()
         channel.send(READY)
-        run(channel, displays, prompt=ros is not None)
+        _show(channel, displays, prompt=ros is not None)
+
+
+def _show(
+    channel: Channel, displays: Sequence[Page | FoxgloveSink | RosSink], prompt: bool
+) -> None:
+    """Show what comes until the program has ended, and that it has.
+
+    With `prompt` each message as it comes. That costs the program time, so else it is at pictures.
+    """
+    ended = False
+    while not (ended or channel.closed):
+        wait = min(each.draw(time.monotonic()) for each in displays)
+        if prompt:
+            select.select((channel,), (), (), wait)
+        else:
+            time.sleep(min(wait, 1.0 / RATE))
+        for kind, content in channel.receive():
+            if ended := kind == END:
+                break
+            for each in displays:
+                each.take(kind, content)
+    for each in displays:
+        each.end()
 
 
 def _sink(port: int) -> FoxgloveSink:

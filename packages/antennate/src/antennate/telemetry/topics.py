@@ -104,37 +104,20 @@ string function
 uint32 line
 """
 _RULE = "=" * 80
-TIME_SCHEMA = f"""\
+_TIME = f"""\
 {_RULE}
 MSG: builtin_interfaces/Time
 int32 sec
 uint32 nanosec
 """
-"""Definition of a time, as it stands behind those that use it."""
-_STATE_SCHEMA = f"""\
-std_msgs/Header header
-string[] name
-float64[] position  # [rad]
-float64[] velocity  # [rad/s]; empty where it is not measured
-float64[] effort    # [N m]; empty where it is not measured
+HEADER_SCHEMA = f"""\
 {_RULE}
 MSG: std_msgs/Header
 builtin_interfaces/Time stamp
 string frame_id
-{TIME_SCHEMA}"""
-_IMU_SCHEMA = f"""\
-std_msgs/Header header
-geometry_msgs/Quaternion orientation
-float64[9] orientation_covariance  # the first is -1: no orientation is measured
-geometry_msgs/Vector3 angular_velocity  # as the controller got it [rad/s]; NaN is unknown
-float64[9] angular_velocity_covariance
-geometry_msgs/Vector3 linear_acceleration  # specific force, likewise [m/s^2]
-float64[9] linear_acceleration_covariance
+{_TIME}"""
+TURN_SCHEMA = f"""\
 {_RULE}
-MSG: std_msgs/Header
-builtin_interfaces/Time stamp
-string frame_id
-{TIME_SCHEMA}{_RULE}
 MSG: geometry_msgs/Quaternion
 float64 x
 float64 y
@@ -146,6 +129,22 @@ float64 x
 float64 y
 float64 z
 """
+_STATE_SCHEMA = f"""\
+std_msgs/Header header
+string[] name
+float64[] position  # [rad]
+float64[] velocity  # [rad/s]; empty where it is not measured
+float64[] effort    # [N m]; empty where it is not measured
+{HEADER_SCHEMA}"""
+_IMU_SCHEMA = f"""\
+std_msgs/Header header
+geometry_msgs/Quaternion orientation
+float64[9] orientation_covariance  # the first is -1: no orientation is measured
+geometry_msgs/Vector3 angular_velocity  # as the controller got it [rad/s]; NaN is unknown
+float64[9] angular_velocity_covariance
+geometry_msgs/Vector3 linear_acceleration  # specific force, likewise [m/s^2]
+float64[9] linear_acceleration_covariance
+{HEADER_SCHEMA}{TURN_SCHEMA}"""
 _LOG_SCHEMA = f"""\
 builtin_interfaces/Time stamp
 uint8 level
@@ -154,7 +153,7 @@ string msg
 string file
 string function
 uint32 line
-{TIME_SCHEMA}"""
+{_TIME}"""
 
 
 def _own(name: str, fields: str) -> MessageType:

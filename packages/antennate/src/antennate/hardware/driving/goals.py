@@ -1,7 +1,8 @@
 """A controller whose goals come from another program, under the same supervisor.
 
-It holds where a reading cannot be used, as other controllers do, and when no goals have come for a
-while. Before the first ones it stands as the gait begins.
+It says FORWARD, whichever way goals lead. It holds where a reading cannot be used, as other
+controllers do, and when no goals have come for a while. Before the first ones it stands as the gait
+begins.
 """
 
 from __future__ import annotations
@@ -13,31 +14,11 @@ import numpy as np
 
 from antennate.control.gait import Gait
 from antennate.control.rule_controller import RuleController
+from antennate.hardware.driving.teleop import KeyRule
 from antennate.params.control import ControlParams
 from antennate.params.hardware import GoalsParams
 from antennate.robots.spec import RobotSpec
-from antennate.types import AntennaFrame, Bools, Contact, Floats, Ints, JointCommand, Maneuver
-
-
-class GoalRule:
-    """The rule of a controller: FORWARD, whichever way goals lead, while they are fresh.
-
-    Attributes:
-        fresh: Whether goals came a short time ago.
-    """
-
-    turn_offset = 0.0
-
-    def __init__(self) -> None:
-        self.fresh = False
-
-    def reset(self, rows: Ints | Bools) -> None:
-        """Do nothing: there is no memory."""
-
-    def step(self, t: Floats, level: Floats, contact: Ints, flex: Floats) -> Ints:
-        """FORWARD; HOLD without fresh goals or where a reading cannot be used."""
-        holds = (contact == int(Contact.UNKNOWN)).any(axis=1) | (not self.fresh)
-        return np.where(holds, int(Maneuver.HOLD), int(Maneuver.FORWARD))
+from antennate.types import AntennaFrame, Bools, Floats, Ints, JointCommand, Maneuver
 
 
 class GoalMoves:
@@ -92,7 +73,7 @@ class GoalController(RuleController):
         goals: Callable[[], tuple[Sequence[float], float] | None],
         clock: Callable[[], float],
     ) -> None:
-        self._by_goals, self._moves = GoalRule(), GoalMoves(control, robot)
+        self._by_goals, self._moves = KeyRule(control), GoalMoves(control, robot)
         super().__init__(self._by_goals, control, robot, 1, self._moves)
         self._params, self._goals, self._clock = params, goals, clock
         self._came = -math.inf
@@ -103,5 +84,6 @@ class GoalController(RuleController):
         if (found := self._goals()) is not None:
             self._moves.newest, age = found
             self._came = now - age
-        self._by_goals.fresh = now - self._came <= self._params.release
+        fresh = now - self._came <= self._params.release
+        self._by_goals.wanted = Maneuver.FORWARD if fresh else Maneuver.HOLD
         return super().step(frame)

@@ -25,7 +25,7 @@ from antennate.errors import BadInputError
 SCENE, POSES, SNAPSHOT, TICK = b"S", b"P", b"G", b"T"
 """Kinds of messages: the scene, poses with forces or a snapshot of the engine, a tick."""
 LINKS, PLACES = b"L", b"W"
-"""Names of a robot's links and joints, where its links are: of `sim.frames`."""
+"""Names of a robot's links and joints as JSON; where its links are, of `sim.frames`."""
 HEADER, TEXT, STATE, END = b"H", b"X", b"Z", b"E"
 """The header of a log, a line of text, the state of the controls, the end in order."""
 READY, FAILED = b"R", b"F"
@@ -38,8 +38,7 @@ _BEGUN, _ENDED = b"b", b"e"
 """Kinds that hold a piece of a long message, and its last one."""
 _PART = struct.Struct("<cI")
 ORDER, GOALS = b"O", b"J"
-"""Kinds that come back: what a person wants, as JSON; goals of joints that are accepted."""
-_COUNTS = struct.Struct("<QQd")
+"""Kinds that come back, as JSON: what a person wants; goals of joints that are accepted."""
 _PIECE = 1 << 16
 _LONGEST = 1 << 17
 """Most bytes of a message that goes at once."""
@@ -79,32 +78,6 @@ class Poses(NamedTuple):
             return cls(float(t), numbers[:end].reshape(-1, 12), numbers[end:].reshape(-1, 6))
         except ValueError as error:
             raise BadInputError(f"expected poses, found {error}") from None
-
-
-class Goals(NamedTuple):
-    """Goals of joints that another program wants.
-
-    Attributes:
-        taken: Messages with goals for this robot so far.
-        refused: Others so far, which change nothing.
-        time: Monotonic time at which the newest came [s].
-        angles: The newest goals in the order of the robot's joints [rad], empty without new ones.
-    """
-
-    taken: int
-    refused: int
-    time: float
-    angles: tuple[float, ...]
-
-    def pack(self) -> bytes:
-        """The goals as bytes."""
-        return _COUNTS.pack(*self[:3]) + np.array(self.angles).tobytes()
-
-    @classmethod
-    def unpack(cls, content: bytes) -> Goals:
-        """Goals from the bytes of `pack`."""
-        angles = np.frombuffer(content, np.float64, offset=_COUNTS.size).tolist()
-        return cls(*_COUNTS.unpack_from(content), tuple(angles))
 
 
 class Channel:

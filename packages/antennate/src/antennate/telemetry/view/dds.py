@@ -7,7 +7,8 @@ from the definition of its messages.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
+from contextlib import suppress
 from typing import Any
 
 from cyclonedds.core import DDSException
@@ -27,8 +28,6 @@ _LOCAL = """<CycloneDDS><Domain Id="any"><General><Interfaces>\
 <MaxAutoParticipantIndex>32</MaxAutoParticipantIndex>\
 <Peers><Peer Address="127.0.0.1"/></Peers></Discovery></Domain></CycloneDDS>"""
 """Configuration for this computer alone; nodes that look for others everywhere find it too."""
-_PATIENCE = 0
-"""Time that a write waits for a listener that falls behind [ns]."""
 _KEPT = 10
 """Messages kept for a listener that falls behind, as nodes of ROS 2 do."""
 _TAKEN = 16
@@ -68,11 +67,7 @@ def message_type(name: str, schema: str) -> Any:
 
 def _of_bytes(kind: Any) -> Any:
     """The type, whose messages are now the bytes that they are sent as."""
-
-    def keep(message: Any, data: bytes) -> None:
-        message.data = data
-
-    kind.__init__ = keep
+    kind.__init__ = lambda message, data: setattr(message, "data", data)
     kind.serialize = lambda message, **how: message.data
     kind.deserialize = classmethod(lambda kind, data, **how: kind(data))
     return kind
@@ -80,23 +75,16 @@ def _of_bytes(kind: Any) -> Any:
 
 def _struct(name: str, text: str, kind_of: Callable[[str], Any]) -> Any:
     package, *_, last = name.split("/")
-    fields = dict(_fields(text, kind_of))
-    return make_idl_struct(f"{last}_", f"{package}::msg::dds_::{last}_", fields)
-
-
-def _fields(text: str, kind_of: Callable[[str], Any]) -> Iterator[tuple[str, Any]]:
-    for word, many, number, name in map(_parts, filter(None, text.splitlines())):
+    fields: dict[str, Any] = {}
+    for line in filter(None, text.splitlines()):
+        match = _FIELD.fullmatch(line)
+        if match is None:
+            raise BadInputError(f"ros: expected a field of a message, found {line!r}")
+        word, many, number, field = match.groups("")
         kind = kind_of(word)
-        if many:
-            kind = types.array[kind, int(number)] if number else types.sequence[kind]
-        yield name, kind
-
-
-def _parts(line: str) -> tuple[str, ...]:
-    match = _FIELD.fullmatch(line)
-    if match is None:
-        raise BadInputError(f"ros: expected a field of a message, found {line!r}")
-    return match.groups("")
+        many_of = types.array[kind, int(number)] if number else types.sequence[kind]
+        fields[field] = many_of if many else kind
+    return make_idl_struct(f"{last}_", f"{package}::msg::dds_::{last}_", fields)
 
 
 class Topics:
@@ -131,11 +119,8 @@ class Topics:
             kept: Whether a listener that comes later gets the newest message.
         """
         durability = Policy.Durability.TransientLocal if kept else Policy.Durability.Volatile
-        qos = Qos(
-            Policy.Reliability.Reliable(_PATIENCE),
-            durability,
-            Policy.History.KeepLast(1 if kept else _KEPT),
-        )
+        history = Policy.History.KeepLast(1 if kept else _KEPT)
+        qos = Qos(Policy.Reliability.Reliable(0), durability, history)  # a write never waits
         topic = Topic(self._participant, f"rt{name}", message_type(kind, schema))
         return Writer(DataWriter(self._participant, topic, qos))
 
@@ -148,18 +133,14 @@ class Topics:
 
 
 class Writer:
-    """Publishes one topic; a listener that falls behind costs messages and never time.
+    """Publishes one topic; a listener that falls behind loses messages.
 
     Args:
         writer: That of DDS.
-
-    Attributes:
-        dropped: Messages that found no room.
     """
 
     def __init__(self, writer: Any) -> None:
         self._writer = writer
-        self.dropped = 0
 
     @property
     def heard(self) -> bool:
@@ -168,7 +149,5 @@ class Writer:
 
     def write(self, data: bytes, time: int) -> None:
         """Publish a message of a time [ns]."""
-        try:
+        with suppress(DDSException):
             self._writer.write(self._writer.data_type(data), time)
-        except DDSException:
-            self.dropped += 1

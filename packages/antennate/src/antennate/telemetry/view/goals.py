@@ -10,7 +10,7 @@ from antennate.errors import BadInputError, LogError
 from antennate.messages import one_line, shortened
 from antennate.robots.spec import RobotSpec
 from antennate.telemetry.topics import JOINT_COMMANDS
-from antennate.telemetry.view.channel import GOALS, Channel, Goals
+from antennate.telemetry.view.channel import GOALS, Channel, read
 
 
 class GoalTaker:
@@ -34,20 +34,18 @@ class GoalTaker:
 
     def look(self) -> None:
         """Pass the newest goals on, if some have come."""
-        angles: tuple[float, ...] = ()
-        messages = self._newest()
+        angles, messages = (), self._newest()
         for message in messages:
             try:
                 angles = goals_of(message, self.robot)
+                self._taken += 1
             except (BadInputError, LogError) as error:
                 if not self._refused:
                     self._say(f"ros: goals were refused: {one_line(str(error))}")
                 self._refused += 1
-            else:
-                self._taken += 1
         if messages:
-            now = time.monotonic()
-            self._channel.send(GOALS, Goals(self._taken, self._refused, now, angles).pack())
+            counts = {"taken": self._taken, "refused": self._refused}
+            self._channel.tell(GOALS, **counts, t=time.monotonic(), angles=angles)
 
 
 class ReceivedGoals:
@@ -57,22 +55,21 @@ class ReceivedGoals:
         channel: To the process that takes them.
 
     Attributes:
-        taken: Messages with goals for this robot so far.
-        refused: Others so far.
+        counts: Messages with goals for this robot so far, and others.
     """
 
     def __init__(self, channel: Channel) -> None:
         self._channel = channel
-        self.taken = self.refused = 0
+        self.counts = {"taken": 0, "refused": 0}
 
     def newest(self) -> tuple[Sequence[float], float] | None:
         """The newest goals since the last call [rad] and their age [s], None without any."""
         found = None
         for kind, content in self._channel.receive():
             if kind == GOALS:
-                goals = Goals.unpack(content)
-                self.taken, self.refused = goals.taken, goals.refused
-                found = (goals.angles, goals.time) if goals.angles else found
+                goals = read(content)
+                self.counts = {name: goals[name] for name in self.counts}
+                found = (goals["angles"], goals["t"]) if goals["angles"] else found
         return found and (found[0], time.monotonic() - found[1])
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import json
 import select
 import socket
 import subprocess
@@ -35,19 +36,11 @@ class Place(NamedTuple):
     network: bool = False
     accept: bool = False
 
-    @property
-    def word(self) -> str:
-        """One word of all of it."""
-        return f"{_ROS}{','.join(str(int(each)) for each in self)}"
-
     @classmethod
     def of(cls, words: Sequence[str]) -> Place | None:
-        """The place that one of these words says, None if none does."""
-        for word in words:
-            if word.startswith(_ROS):
-                domain, network, accept = map(int, word.removeprefix(_ROS).split(","))
-                return cls(domain, bool(network), bool(accept))
-        return None
+        """The place in these words of the process, None if they have none."""
+        found = next((word for word in words if word.startswith(_ROS)), None)
+        return None if found is None else cls(*json.loads(found.removeprefix(_ROS)))
 
 
 class ViewProcess:
@@ -97,7 +90,7 @@ class ViewProcess:
             files = [far.fileno()] + ([] if port is None else [listener.fileno()])
             words = [*map(str, files), *(["-"] if port is None else [])]
             words.append("-" if foxglove is None else str(foxglove))
-            words += [] if ros is None else [ros.word]
+            words += [] if ros is None else [_ROS + json.dumps(ros)]
             words += [IDLE] if idle else []
             self._process = subprocess.Popen(  # noqa: S603 our own words
                 [sys.executable, "-m", module, *words],

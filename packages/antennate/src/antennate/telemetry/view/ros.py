@@ -9,18 +9,19 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 
-from antennate.sim.frames import LinkFrames, Links
+import numpy as np
+
+from antennate.sim.frames import LinkFrames
 from antennate.telemetry import transforms
 from antennate.telemetry.header import Header
-from antennate.telemetry.ticks import Tick
 from antennate.telemetry.topics import HEADER_TOPICS, JOINT_COMMANDS, TOPICS
-from antennate.telemetry.transforms import Transforms
-from antennate.telemetry.view.channel import HEADER, LINKS, PLACES, TICK, Channel
+from antennate.telemetry.view.channel import HEADER, LINKS, PLACES, TICK, Channel, read
 from antennate.telemetry.view.dds import Topics
 from antennate.telemetry.view.goals import GoalTaker
 from antennate.telemetry.view.live import LiveTopics
 from antennate.telemetry.view.player import LogScene
 from antennate.telemetry.view.process import Place
+from antennate.types import Floats
 
 GOAL_TOPIC = "/joint_goals"
 """Where goals are taken, of the type of `/joint_states`."""
@@ -35,21 +36,21 @@ class RosSink:
     Args:
         place: Where.
         channel: Where accepted goals go.
-        say: Told why the first goals were refused, and at the end how many messages were lost.
+        say: Told why the first goals were refused.
     """
 
     def __init__(self, place: Place, channel: Channel, say: Callable[[str], None]) -> None:
-        self._topics, self._say = LiveTopics(), say
         self._node = node = Topics(place.domain, place.network)  # all ends with it
+        self._live = LiveTopics()
         self._writers = {
             topic: node.writer(
-                topic.name, topic.type.name, topic.type.schema, kept=topic in HEADER_TOPICS
+                topic.name, topic.type.name, topic.type.schema, topic in HEADER_TOPICS
             )
             for topic in TOPICS
         }
         self._tf = node.writer(transforms.NAME, transforms.TYPE, transforms.SCHEMA)
-        self._transforms: Transforms | None = None
-        self._robot: _Robot | None = None
+        self._names, self._parents = list[str](), list[int]()
+        self._scene: LogScene | None = None
         self._goals: GoalTaker | None = None
         if place.accept:
             kind = JOINT_COMMANDS.type
@@ -63,49 +64,35 @@ class RosSink:
         return _LOOK
 
     def end(self) -> None:
-        """Say how many messages found no room."""
-        if dropped := sum(each.dropped for each in (*self._writers.values(), self._tf)):
-            self._say(f"ros: {dropped} messages found no room")
+        """What was sent stays with who reads."""
 
     def take(self, kind: bytes, content: bytes) -> None:
         """Send a message on."""
-        live = self._topics
+        live = self._live
         if kind == LINKS:
-            links = Links.unpack(content)
-            live.names, live.start = links.joints, time.time_ns()
-            self._transforms = Transforms(links, placed=True)
+            links = read(content)
+            self._names, self._parents = links["names"], links["parents"]
+            live.names, live.start = tuple(links["joints"]), time.time_ns()
         for topic, data in live.messages(kind, content):
             self._writers[topic].write(data, live.now)
         if kind == HEADER and live.header is not None:
             self._begin(live.header)
         elif kind == PLACES:
-            self._place(content)
-        elif kind == TICK and self._robot is not None and self._tf.heard:
-            self._place(self._robot.places(live.tick))
+            self._place(np.frombuffer(content).reshape(-1, 7))
+        elif kind == TICK and self._scene is not None and live.tick is not None:
+            self._scene.place_joints(live.tick)
+            self._place(self._frames.places(self._scene.world.data))
 
     def _begin(self, header: Header) -> None:
-        """Know the robot of a drive or of a log."""
-        self._robot = _Robot(header)
-        self._transforms = Transforms(self._robot.links, placed=False)
+        """Know the robot of a drive or of a log, put where its joints are."""
+        self._scene = LogScene(header, None)
+        self._frames = LinkFrames(self._scene.world.model)
+        self._names, self._parents = self._frames.names, self._frames.parents
         if self._goals is not None:
             self._goals.robot = header.robot
 
-    def _place(self, places: bytes) -> None:
-        if self._transforms is not None and self._tf.heard:
-            now = self._topics.now
-            self._tf.write(self._transforms.encode(places, now), now)
-
-
-class _Robot:
-    """The robot of a drive or of a log, put where its joints are."""
-
-    def __init__(self, header: Header) -> None:
-        self._scene = LogScene(header, None)
-        self._frames = LinkFrames(self._scene.world.model)
-        self.links = self._frames.links
-
-    def places(self, tick: Tick | None) -> bytes:
-        """Where its links are, wherever its head is."""
-        if tick is not None:
-            self._scene.place_joints(tick)
-        return self._frames.places(self._scene.world.data)
+    def _place(self, places: Floats) -> None:
+        if self._tf.heard:
+            now, placed = self._live.now, self._scene is None
+            data = transforms.encoded(self._names, self._parents, places, now, placed)
+            self._tf.write(data, now)

@@ -7,11 +7,10 @@ from __future__ import annotations
 
 import html
 import math
-import select
 import time
 from collections import deque
-from collections.abc import Mapping, Sequence
-from typing import Any, Protocol
+from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 import viser
@@ -21,7 +20,6 @@ from antennate.sim.shapes import Shapes, VisibleModel, picture
 from antennate.telemetry.header import Header
 from antennate.telemetry.ticks import Tick
 from antennate.telemetry.view.channel import (
-    END,
     HEADER,
     POSES,
     SCENE,
@@ -48,46 +46,6 @@ _SENDING = 0.5
 """Time for the last messages to leave [s]; assumed."""
 _SIDES = (rgba(SERIES[0]), rgba(SERIES[1]))
 _COUNTERS = ("missed", "frames", "crc", "lost", "misses", "stale", "sent", "refused")
-
-
-class Display(Protocol):
-    """What shows messages of the channel."""
-
-    def draw(self, now: float) -> float:
-        """Draw what is due at a time [s]; the time until more may be due [s]."""
-        ...
-
-    def take(self, kind: bytes, content: bytes) -> None:
-        """Take a message."""
-        ...
-
-    def end(self) -> None:
-        """Show that the program has ended."""
-        ...
-
-
-def run(channel: Channel, displays: Sequence[Display], prompt: bool = False) -> None:
-    """Show what comes until the program has ended, and that it has.
-
-    Args:
-        channel: Where it comes from.
-        displays: What shows it.
-        prompt: Whether it is shown as it comes, which costs the program time; else at pictures.
-    """
-    ended = False
-    while not (ended or channel.closed):
-        wait = min(each.draw(time.monotonic()) for each in displays)
-        if prompt:
-            select.select((channel,), (), (), wait)
-        else:
-            time.sleep(min(wait, 1.0 / RATE))
-        for kind, content in channel.receive():
-            if ended := kind == END:
-                break
-            for each in displays:
-                each.take(kind, content)
-    for each in displays:
-        each.end()
 
 
 class Page:

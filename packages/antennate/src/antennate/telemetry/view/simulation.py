@@ -27,6 +27,7 @@ _SIDES = (rgba(SERIES[0]), rgba(SERIES[1]))
 _FARTHEST = 50.0
 """Farthest from the origin that an obstacle is put [m]; a world beyond 100 m is unsound."""
 _NOT_A_NUMBER = (math.nan, math.nan)
+_LINKS = ("joints", "names", "parents")
 NONE = -1
 """Stands for a maneuver where there is none."""
 
@@ -116,7 +117,8 @@ class SimulationView(Pace):
             self.channel.send_whole(SCENE, self._model.shapes().pack())
             if self._every:
                 self._frames = LinkFrames(model)
-                self.channel.send(LINKS, self._frames.links.pack())
+                names = {name: getattr(self._frames, name) for name in _LINKS}
+                self.channel.tell(LINKS, **names)
         elif self.idle:
             return ()
         self._data, self._last = data, (frame, controller, maneuver)
@@ -139,8 +141,8 @@ class SimulationView(Pace):
         tick = self._tick(self._data.time, *self._last)
         if frames is None:
             return [(TICK, tick.pack())]
-        tick = replace(tick, **frames.joints(self._data))
-        return [(TICK, tick.pack()), (PLACES, frames.places(self._data))]
+        tick = replace(tick, **frames.drives(self._data))
+        return [(TICK, tick.pack()), (PLACES, frames.places(self._data).tobytes())]
 
     def _tick(
         self, t: float, frame: AntennaFrame | None, controller: Controller | None, maneuver: int
