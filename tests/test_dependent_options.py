@@ -78,7 +78,9 @@ def test_each_is_refused_alone(
 ) -> None:
     """With its own default, too: it was said, and nothing would come of it."""
     monkeypatch.chdir(tmp_path)
-    value = {"TEXT": "x", "FILE": "x", "NAME=VALUE": "a=1"}.get(option.metavar, option.default)
+    value = {"DOMAIN": "7", "TEXT": "x", "FILE": "x", "NAME=VALUE": "a=1"}.get(
+        option.metavar, option.default
+    )
     words = [option.offered, *([value] if option.metavar else [])]
     err = refused(*name.split(), *words)
     needed = " or ".join(option.needs)

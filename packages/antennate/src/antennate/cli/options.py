@@ -303,7 +303,7 @@ class LiveOptions:
     ros_domain: int | None = option(
         None,
         "domain of these, else ROS_DOMAIN_ID or 0",
-        "INT",
+        "DOMAIN",
         needs=["--ros"],
         ge=0,
         le=LAST_DOMAIN,

@@ -28,8 +28,8 @@ _LOCAL = """<CycloneDDS><Domain Id="any"><General><Interfaces>\
 <MaxAutoParticipantIndex>32</MaxAutoParticipantIndex>\
 <Peers><Peer Address="127.0.0.1"/></Peers></Discovery></Domain></CycloneDDS>"""
 """Configuration for this computer alone; nodes that look for others everywhere find it too."""
-_KEPT = 10
-"""Messages kept for a listener that falls behind, as nodes of ROS 2 do."""
+_KEPT = 100
+"""Messages kept for a listener that falls behind: those of a second (assumed)."""
 _TAKEN = 16
 """Most messages taken at once; of more the newest are left (assumed: twice what a peer sends)."""
 _PRIMITIVES: dict[str, Any] = {

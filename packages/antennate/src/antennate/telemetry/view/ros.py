@@ -76,23 +76,26 @@ class RosSink:
         for topic, data in live.messages(kind, content):
             self._writers[topic].write(data, live.now)
         if kind == HEADER and live.header is not None:
-            self._begin(live.header)
+            self._scene = None
+            if self._goals is not None:
+                self._goals.robot = live.header.robot
         elif kind == PLACES:
             self._place(np.frombuffer(content).reshape(-1, 7))
-        elif kind == TICK and self._scene is not None and live.tick is not None:
-            self._scene.place_joints(live.tick)
-            self._place(self._frames.places(self._scene.world.data))
+        elif kind == TICK and live.header is not None and self._tf.heard:
+            self._place(self._placed(live.header))
 
-    def _begin(self, header: Header) -> None:
-        """Know the robot of a drive or of a log, put where its joints are."""
-        self._scene = LogScene(header, None)
-        self._frames = LinkFrames(self._scene.world.model)
-        self._names, self._parents = self._frames.names, self._frames.parents
-        if self._goals is not None:
-            self._goals.robot = header.robot
+    def _placed(self, header: Header) -> Floats:
+        """Places of the links of a drive or of a log, from the angles of the newest tick."""
+        if self._scene is None:
+            self._scene = LogScene(header, None)
+            self._frames = LinkFrames(self._scene.world.model)
+            self._names, self._parents = self._frames.names, self._frames.parents
+        if self._live.tick is not None:
+            self._scene.place_joints(self._live.tick)
+        return self._frames.places(self._scene.world.data)
 
     def _place(self, places: Floats) -> None:
         if self._tf.heard:
-            now, placed = self._live.now, self._scene is None
+            now, placed = self._live.now, self._live.header is None
             data = transforms.encoded(self._names, self._parents, places, now, placed)
             self._tf.write(data, now)
