@@ -136,6 +136,14 @@ bench wall --antenna.base-angle 0.5 :: expected a parameter that bench wall read
 doctor --robot.mass 5 :: expected a parameter that doctor reads, found this one
 drive --robot.leg-friction=0.5 :: expected a parameter that drive reads, found this one
 drive teleop --controller open :: expected a parameter that drive teleop reads, found this one
+drive teleop --protocol identify :: expected a parameter that drive teleop reads, found this one
+drive --protocol identify --controller open :: found open :: , but a protocol takes its place
+drive --protocol identify --control.gait.frequency 0.4 :: found 0.4 :: , but a protocol does not read it
+drive --protocol identfy :: --protocol: expected identify or a TOML file (did you mean identify?) :: found 'identfy'
+drive --protocol missing.toml :: missing.toml: expected a readable file
+drive --protocol identify :: --esp32: expected a serial port, found none
+drive --tell orders :: --tell: expected --protocol beside it, found none
+drive --protocol identify --tell . :: --tell: expected a file, or a named pipe that :: found .: Is a directory
 setup jog --robot.antenna.length 0.1 :: expected a parameter that setup jog reads, found this one
 twin --control.gait.frequency 0.4 :: expected a parameter that twin reads, found this one
 """

@@ -17,6 +17,7 @@ from antennate.cli import viewer
 from antennate.cli.keys import END, pressed_keys, typed_keys
 from antennate.cli.options import PageOptions, option
 from antennate.cli.pages import page_of
+from antennate.cli.recordings import NAME, Recordings, recordings
 from antennate.cli.results import ResultOptions, folder_for, show_result
 from antennate.cli.robot import PortOptions, at_hand, key_of, parse_robot, require_two_ports
 from antennate.cli.terminal import BAD_INPUT, OK
@@ -56,9 +57,15 @@ written. Then, with --arm only, torque comes on with every servo where it stands
 walks. Ctrl-C, Ctrl-\\, SIGTERM or a lost terminal ends it: command held, torque off,
 verified.
 
+--protocol NAME|FILE makes recordings in place of a walk, step by step: joints alone while the robot
+hangs, walks, pushes of the antennae. It says what you are to do; the space bar confirms it, or time
+where there is no terminal. A HOLD or a FAULT ends it. Given again with --out of its folder, it goes
+on with the step that was broken off.
+
 A lost board or servo makes the robot hold; the watchdogs of the servos stop it if this program
 dies. The exit code is 2 if it ended in a FAULT or without supply, if torque was refused or is not
-off, if it was armed and never walked, and if its log ended before the drive did."""
+off, if it was armed and never walked, if its log ended before the drive did, and if steps of a
+protocol are left."""
 TELEOP_DESCRIPTION = """\
 Walk the real robot, or its twin, by keys: the arrows (or w, a, d, s) are FORWARD, TURN_L, TURN_R
 and REVERSE, the space bar stands, o lets the antennae oscillate, q ends. All else is as with
@@ -88,12 +95,28 @@ class DriveOptions(ResultOptions, PortOptions, PageOptions):
     )
 
 
+@dataclass(frozen=True)
+class ProtocolOptions(DriveOptions):
+    """Whether to move, and who does what a protocol asks for."""
+
+    tell: Path | None = option(
+        None,
+        "file or pipe for what a person is to do, such as the --orders of a twin; time confirms it",
+        "FILE",
+    )
+
+
 def command(argv: Sequence[str]) -> int:
     """Drive until the duration is over or it is stopped."""
     model = GoalsConfig if "--accept" in argv else DriveConfig
-    config, options = parse_robot("drive", DESCRIPTION, model, argv, DriveOptions)
+    config, options = parse_robot("drive", DESCRIPTION, model, argv, ProtocolOptions)
     require_antennae(config.robot, "drive")
-    return _walk(VIEW, config, options, argv)
+    if not config.protocol:
+        if options.tell is not None:
+            raise ConfigError("--tell: expected --protocol beside it, found none")
+        return _walk(VIEW, config, options, argv)
+    with recordings(config, options.tell) as course:
+        return _walk(VIEW, config, options, argv, course.controller, course)
 
 
 def _require_robot(config: DriveConfig, options: DriveOptions) -> None:
@@ -112,6 +135,7 @@ def _walk(
     options: DriveOptions,
     argv: Sequence[str],
     controller: Callable[[Session, DriveConfig], Controller] | None = None,
+    course: Recordings | None = None,
 ) -> int:
     """Drive by the controller that is named, or by another one: the exit code.
 
@@ -121,16 +145,29 @@ def _walk(
         options: Where it is, and whether it moves.
         argv: The words of the command.
         controller: Makes the controller once the session is there; None for the one that is named.
+        course: The recordings that it makes, if any.
     """
     _require_robot(config, options)
     given, config = config, config.calibrated()
+    name = config.controller if controller is None else NAME if course else view.name
+    header = Header(
+        controller=name,
+        params=config.control,
+        robot=config.robot,
+        calibration=_calibration(given),
+        protocol=course.protocol.model_dump(mode="json") if course else {},
+    )
+    identity = course.identity(header) if course else None
     key = key_of(options)
     with (
         page_of(options, idle=not options.accept, accept=options.accept)
         or contextlib.nullcontext() as page,
         _operator(config, options) as operator,
-        folder_for(view, options, config, argv) as folder,
+        folder_for(view, options, config, argv, identity, resume=bool(course)) as folder,
     ):
+        folder.require_free(view.figures)
+        if course is not None:
+            course.go_on(folder)
         folder.keep_room()
         folder.claim_names(LOG_PARTS)
         with connect(config, options.esp32, options.bus, key) as session:
@@ -144,20 +181,17 @@ def _walk(
                 config = config.model_copy(update={"controller": "goals"})
             elif controller is not None:
                 session.control.controller = controller(session, config)
-                config = config.model_copy(update={"controller": view.name})
-            header = Header(
-                controller=config.controller,
-                params=config.control,
-                robot=config.robot,
-                start=max(0, time.time_ns() - round(1e9 * session.clock.now())),
-                calibration=_calibration(given),
-            )
+                config = config.model_copy(update={"controller": name})
+            start = max(0, time.time_ns() - round(1e9 * session.clock.now()))
+            header = header.model_copy(update={"start": start})
             file = None if page is None else page.channel.fileno()
             log = folder.path / LOG
-            record = _Record(header, log, config.record_required, file, options.ros)
+            record = _Record(header, log, config.record_required, file, options.ros, course)
             result = _carry_out(view.name, config, session, options, record, operator, page)
             if goals is not None:
                 result["goals"] = goals.counts
+        if course is not None:
+            result |= course.result(folder.path)
         try:
             folder.finish(result, ())
         finally:  # the robot's state is told even if it cannot be kept
@@ -166,7 +200,9 @@ def _walk(
             words = ["--controller", "open"] if own else []
             if config.controller not in BUILT_IN and not own:
                 words = ["--controller", config.controller]
-            _show(result, options, typed("replay", str(log), *words))
+            more = [] if options.out else ["--out", str(folder.path)]
+            again = typed("drive", *(word for word in argv if word != "--overwrite"), *more)
+            _show(result, options, typed("replay", str(log), *words), again)
         ticks = 0 if result["pace"] is None else result["pace"]["ticks"]
         if result["logs"] and 0 < ticks <= _LONGEST_DRAWN:
             from antennate.telemetry.figure import drawn  # slow to import
@@ -178,19 +214,21 @@ def _walk(
     return BAD_INPUT if viewer.failed(result) or result["log_cut"] else OK
 
 
-def _show(result: Mapping[str, Any], options: DriveOptions, replay: str) -> None:
-    """Table and sentences; `replay` is the command that reads the log."""
-    again = f"What was read and decided: {replay}"
+def _show(result: Mapping[str, Any], options: DriveOptions, replay: str, again: str) -> None:
+    """Table and sentences; `replay` is the command that reads the log, `again` goes on."""
+    told = f"What was read and decided: {replay}"
     if not result["logs"]:
-        again = f"No log was kept: {viewer.log_failure(result)}."
-    show_result(result, options, viewer.tables(result), f"{viewer.sentences(result)}\n{again}")
+        told = f"No log was kept: {viewer.log_failure(result)}."
+    if result["armed"] and result.get("interrupted"):
+        told = f"It goes on with {result['protocol']['left'][0]}: {again}\n{told}"
+    show_result(result, options, viewer.tables(result), f"{viewer.sentences(result)}\n{told}")
 
 
 @dataclasses.dataclass(frozen=True)
 class _Record:
     """What the log begins with, its first file, whether it is required, and the file of a page.
 
-    `every` says whether that gets each tick.
+    `every` says whether that gets each tick. A course may have a log already, and goes on with it.
     """
 
     header: Header
@@ -198,13 +236,15 @@ class _Record:
     required: bool
     page: int | None
     every: bool
+    course: Recordings | None
 
     def words(self, number: int) -> list[str]:
         """The command line of the process that writes the n-th file."""
         more = [viewer.REQUIRED] if self.required else []
         more += [viewer.EVERY] if self.every else []
         more += [f"{viewer.PAGE}{file}" for file in self.files]
-        return [sys.executable, "-m", viewer.MODULE, str(part(self.log, number)), *more]
+        file = part(self.log, number + (self.course.files if self.course else 0))
+        return [sys.executable, "-m", viewer.MODULE, str(file), *more]
 
     @property
     def files(self) -> list[int]:
@@ -232,13 +272,16 @@ def _carry_out(
     page: ViewProcess | None,
 ) -> dict[str, Any]:
     """Drive, with the log and the status line in a process of their own, as with a page."""
-    feed = Feed(record.words, record.header.pack(), files=record.files)
+    course = record.course
+    header = (course and course.header) or record.header
+    feed = Feed(record.words, header.pack(), files=record.files)
     log = record.log
     unlogged, recent = False, Recent()
 
     def keep(session: Session, t: float) -> None:
         nonlocal unlogged, page
         tick = Tick.of(session, t)
+        tick = course.continued(tick, record.header.start) if course else tick
         missed, out = recent.step(t, tick.missed), session.outputs
         if page is not None and missed > MANY and out is not None and out.torque:
             page.give_up(f"the loop missed {missed} ticks within a second; the drive goes on")
@@ -262,7 +305,7 @@ def _carry_out(
     head = {"schema": 1, "command": command, "controller": config.controller, "armed": options.arm}
     tail = {
         "priority": priority.value,
-        "unlogged": 0 if complete else feed.offered - count(log),
+        "unlogged": 0 if complete else feed.offered - count(log) + (course.ticks if course else 0),
         "log_complete": complete,
         "log_cut": feed.failed or not logs,
         "log_failure": why,

@@ -68,15 +68,16 @@ torque.
 
 --touch left@2s right@5s bends the antennae of the standing robot, as the check by touch of
 `antennate drive` wants it, from the beginning of each client on. left:20mm@2s holds the left one,
-its tip 20 mm aside. A robot that has walked is put back to the start when a new client begins and
-no servo has torque.
+its tip 20 mm aside, left:10mm:60mm@2s the place 60 mm from its base. A robot that has walked is put
+back to the start when a new client begins and no servo has torque.
 
 --push yaw1=20deg@3s turns a joint whose servo has no torque.
 
 --servos 1:xl330-m288 2:xl430-w250@1000000 1:xc430-w240x17 serves DYNAMIXEL servos alone, all else
 as delivered. --orders reads lines while it runs: plug NAME, unplug NAME, only NAME, next,
 push NAME=ANGLE, where a NAME is a joint, a number from 1 on, or all; touch left:20mm, to follow
-the marks of `antennate record`; fault servo:7=silent.
+the marks of `antennate record`; hang and floor, as `antennate drive --protocol` asks for it; fault
+servo:7=silent.
 
 Faults, each with @Ts for its time:
 servo:ID=silent, bad_crc, truncated, late:SECONDS, doubled, wrong_id, oversized, voltage, overheat,

@@ -43,8 +43,10 @@ REQUIRED, EVERY, PAGE = "required", "every", "page="
 _STDOUT = 1
 _BEFORE = re.compile(r"(HOLD|FAULT|OFF) (?!NOT_READY|UNKNOWN_CONTACT|UNDECIDED)")
 """A cause that is also shown while the robot is not armed."""
-_ASKED = re.compile(r"touch=\((.*)\)(?= drift=|$)")
+_ASKED = re.compile(r"do=\(([^)]*)\)|touch=\((.*)\)(?= drift=|$)")
 """What a person is to do, within the note of a tick."""
+_STEP = re.compile(r"step \d+ of \d+: .* min left")
+"""Step of a protocol, the next one, and the time that is left, likewise."""
 
 
 class Display:
@@ -57,7 +59,9 @@ class Display:
     def show(self, tick: Tick, unlogged: int) -> None:
         """Show a tick, if one is due or if something new is asked."""
         match = _ASKED.search(tick.note)
-        asked = match[1] if match else ""
+        asked = (match[1] or match[2]) if match else ""
+        if (step := _STEP.search(tick.note)) and any(e.startswith("begin") for e in tick.events):
+            self.status.say(f"{step[0][0].upper()}{step[0][1:]}.")
         if asked not in ("", self._asked) and self.status.terminal:
             self.status.say(f"{asked[0].upper()}{asked[1:]}.")
         self._asked = asked
@@ -271,8 +275,16 @@ def sentences(result: Mapping[str, Any]) -> str:
     if goals := result.get("goals"):
         last.append(f"Goals of joints: {goals['taken']} taken, {goals['refused']} refused.")
     void = void_sentence({f"`{result['controller']}`": result.get("void_decisions", 0)})
-    lines = [_sentence(result), void, *late_sentence(result), *what_to_do(causes), *last]
+    told = _recorded(result)
+    lines = [_sentence(result), told, void, *late_sentence(result), *what_to_do(causes), *last]
     return "\n".join(filter(None, lines))
+
+
+def _recorded(result: Mapping[str, Any]) -> str:
+    """How far a protocol has come; empty of another drive."""
+    told = result.get("protocol")
+    count = told and f"{len(told['recorded'])} of {told['steps']}"
+    return f"Steps of the protocol that are recorded: {count}." if count else ""
 
 
 _LONG = 1.0
@@ -282,7 +294,8 @@ _LONG = 1.0
 def failed(result: Mapping[str, Any]) -> bool:
     """Whether a drive ends with exit code 2, its log apart."""
     fault = result["worst_state"] in (State.FAULT.name, State.OFF.name)
-    return fault or result["torque_off"] is False or bool(result["refusal"]) or _idle(result)
+    cut = result["armed"] and result.get("interrupted", False)
+    return cut or fault or result["torque_off"] is False or bool(result["refusal"]) or _idle(result)
 
 
 def _idle(result: Mapping[str, Any]) -> bool:

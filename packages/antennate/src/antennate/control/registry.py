@@ -188,9 +188,14 @@ def make_controller(
     return controller
 
 
-TELEOP, GOALS = "keys of teleop", "goals of other programs"
-"""Stand for the controllers of `drive teleop` and `drive --accept`, which have no name."""
-_NOT_NAMED = (TELEOP, GOALS)
+TELEOP, GOALS, PROTOCOL = "keys of teleop", "goals of other programs", "a protocol"
+"""Stand for the controllers of `drive teleop`, `--accept` and `--protocol`, which have no name."""
+_UNNAMED: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
+    TELEOP: (("gait.turn_offset",), ()),
+    GOALS: ((), ()),
+    PROTOCOL: (("gait.turn_offset",), ("gait.frequency",)),
+}
+"""What these read of turns, and what they do not read of the gait."""
 KEPT_BY_CLIMBERS = ("robot.pitch.limit", "robot.elevation.limit")
 """Parameters of the hardware that controllers that climb keep, in a simulation too."""
 
@@ -205,8 +210,9 @@ def unread(name: str, control: ControlParams, knows: Collection[str] = ()) -> se
         control: All numbers of the control.
         knows: What a simulation tells it; a robot tells nothing.
     """
-    if name in _NOT_NAMED:
-        return unread_of(("gait.turn_offset",) if name == TELEOP else (), False, control)
+    if name in _UNNAMED:
+        reads, leaves = _UNNAMED[name]
+        return unread_of(reads, False, control).union(leaves)
     if (kind := KINDS.get(name)) is not None:
         return unread_of(kind.reads, kind.climbs, control, knows)
     return set(UNREAD_BY_POLICIES) if name.endswith(".onnx") else set()
@@ -222,7 +228,7 @@ def unread_by_all(
     who = f"{' and '.join(names)} {'does' if len(names) == 1 else 'do'} not read it"
     paths = set.intersection(*(unread(name, control, knows) for name in names))
     reasons = {f"control.{path}": who for path in sorted(paths)}
-    if not all(name in _NOT_NAMED or name in KINDS for name in names):
+    if not all(name in _UNNAMED or name in KINDS for name in names):
         return reasons
     if not robot.has_imu:
         for path in paths_of(HeadingParams, "control.climb.heading"):
@@ -232,7 +238,7 @@ def unread_by_all(
 
 def unread_limits(names: Sequence[str]) -> dict[str, str]:
     """Limits of joints that none of these controllers keeps, and why."""
-    kinds = [KINDS.get(name) for name in names if name not in _NOT_NAMED]
+    kinds = [KINDS.get(name) for name in names if name not in _UNNAMED]
     if any(kind is None or kind.climbs for kind in kinds):
         return {}
     return dict.fromkeys(KEPT_BY_CLIMBERS, "only controllers that climb read it in a simulation")

@@ -9,10 +9,12 @@ from typing import Any, ClassVar, Self
 from pydantic import field_validator, model_validator
 
 from antennate.antenna.calibration import Calibration
+from antennate.control.protocol import PROTOCOLS
 from antennate.control.readers import SIMULATION_ALONE, UNDRIVEN, unused
 from antennate.control.registry import (
     BUILT_IN,
     GOALS,
+    PROTOCOL,
     TELEOP,
     check_for_robots,
     unread,
@@ -188,10 +190,15 @@ class DriveConfig(RobotConfig):
     """The robot, its controller, and how long it runs."""
 
     unread: ClassVar[tuple[str, ...]] = (*UNDRIVEN, "zeros.measured")
-    offered: ClassVar[Mapping[str, Collection[str]]] = {"controller": BUILT_IN}
+    offered: ClassVar[Mapping[str, Collection[str]]] = {
+        "controller": BUILT_IN,
+        "protocol": PROTOCOLS,
+    }
 
     controller: str = number("closed", "1", "assumed: our best")
     """{offered}, MODULE:NAME or FILE.py:NAME of your own, or FILE.onnx, a learned policy."""
+    protocol: str = number("", "1", "assumed: a controller walks", metavar="NAME|FILE")
+    """Recordings in place of a controller: {offered} or a TOML file."""
     dry_run: float = number(10.0, "s", "assumed: long enough to touch both antennae", ge=0, le=600)
     """Time before torque."""
     duration: float | None = number(None, "s", "assumed: until it is stopped", gt=0)
@@ -238,11 +245,12 @@ class DriveConfig(RobotConfig):
     @property
     def reader(self) -> str:
         """What reads the numbers of the control."""
-        return self.controller
+        return PROTOCOL if self.protocol else self.controller
 
     def unread_here(self) -> Mapping[str, str]:
         """What this robot does not have, and what its controller does not read."""
-        return unused(self.robot) | unread_by_all([self.reader], self.control, self.robot)
+        more = {"controller": "a protocol takes its place"} if self.protocol else {}
+        return unused(self.robot) | unread_by_all([self.reader], self.control, self.robot) | more
 
 
 _IMU = paths_of(ImuParams, "robot.imu")
@@ -295,6 +303,7 @@ class TeleopConfig(DriveConfig):
         *DriveConfig.unread,
         "controller",
         "goals.release",
+        "protocol",
         *paths_of(DeadManParams, "dead_man"),
         *(f"control.{path}" for path in sorted(unread(TELEOP, ControlParams()))),
     )
@@ -312,6 +321,7 @@ class GoalsConfig(DriveConfig):
     unread: ClassVar[tuple[str, ...]] = (
         *DriveConfig.unread,
         "controller",
+        "protocol",
         *(f"control.{path}" for path in sorted(unread(GOALS, ControlParams()))),
     )
 

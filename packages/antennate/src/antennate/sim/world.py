@@ -8,7 +8,7 @@ the world with a `SimulationError`.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -147,6 +147,7 @@ class World:
         servo_drives: Gain and limits of the servos' drives.
         t: Time since the world was made [s].
         height_limit: Height that no head can have [m].
+        forces: Sets forces of its own before each physics step; None without any.
     """
 
     def __init__(self, model: mujoco.MjModel, robot: RobotSpec, top: float = 0.0) -> None:
@@ -163,6 +164,7 @@ class World:
         stall = np.array([servo.stall_torque for servo in robot.joint_servos])
         self.servo_drives = ServoDrives(model, names, stall)
         self.root = places.root
+        self.forces: Callable[[], None] | None = None
         self._steps = 0
         self._before = 0.0
         data = self.data
@@ -313,6 +315,10 @@ class World:
         self._before = self.data.time
         self._steps += count
         try:
+            while self.forces is not None and count:
+                self.forces()
+                self.gears.step(self.data, 1)
+                count -= 1
             self.gears.step(self.data, count)
         except mujoco.FatalError as error:
             raise SimulationError(self._steps, str(error).splitlines()[0]) from error

@@ -125,7 +125,10 @@ class RunDirectory:
             self.finished = self.untouched = self.kept = ended
         if before and not self.finished:
             run_files.remove_run(
-                place, lambda file: file.parent.name == LOGS or file.name == TRIALS
+                place,
+                lambda file: (
+                    file.parent.name == LOGS or file.name in (TRIALS, *run_files.LOG_PARTS)
+                ),
             )
 
     @classmethod

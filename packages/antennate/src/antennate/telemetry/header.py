@@ -81,6 +81,8 @@ class Header(Strict):
             robot; empty where its run tells, or where it was no simulation.
         knows: What a simulation gave to the controller beside its readings; not in the log.
         calibration: The calibration file of the antennae, as text; empty without one.
+        protocol: The protocol of recordings of a drive, as its `Protocol` has it for this robot;
+            empty of others.
         versions: Versions of what wrote it, by name.
     """
 
@@ -96,6 +98,7 @@ class Header(Strict):
     arena: Mapping[str, Any] = Field(default_factory=dict)
     knows: tuple[str, ...] = ()
     calibration: str = ""
+    protocol: Mapping[str, Any] = Field(default_factory=dict)
     versions: Mapping[str, str] = Field(default_factory=versions)
 
     @property
@@ -120,7 +123,7 @@ class Header(Strict):
         """Messages of the header in a log."""
         from antennate.telemetry.topics import CALIBRATION, CONFIG, VERSIONS  # not without a log
 
-        apart = {"calibration", "versions"}
+        apart = {"calibration", "versions"} | (set() if self.protocol else {"protocol"})
         texts = {
             CONFIG: self.model_dump_json(exclude=apart),
             VERSIONS: json.dumps(dict(self.versions)),

@@ -80,6 +80,7 @@ class Tick:
         efforts: Measured joint torques [N·m], empty if unknown.
         angular_velocity: Of the head, as the controller got it [rad/s]; empty without a sensor.
         linear_acceleration: Specific force on it, likewise [m/s²].
+        events: What began or ended with this tick, as a step of a protocol.
     """
 
     number: int
@@ -110,6 +111,7 @@ class Tick:
     efforts: tuple[float, ...] = ()
     angular_velocity: tuple[float, ...] = ()
     linear_acceleration: tuple[float, ...] = ()
+    events: tuple[str, ...] = ()
 
     @classmethod
     def of(cls, session: Session, t: float) -> Tick:
@@ -126,7 +128,8 @@ class Tick:
             reading=(left, right),
             state="" if out is None else out.state.name,
             causes=() if out is None else tuple(_clean(cause.text) for cause in out.causes),
-            note=_clean(session.quality.status),
+            note=_clean(f"{session.note} {session.quality.status}".lstrip()),
+            events=session.events,
             age=clock.age(t),
             missed=0 if session.timing is None else session.timing.report().missed_cycles,
             frames=bytes_.good,

@@ -194,14 +194,16 @@ IMU = Topic(
 EVENTS = Topic(
     "/events",
     MessageType("rcl_interfaces/msg/Log", _LOG, _LOG_SCHEMA),
-    "each change of the supervisor's state, and a recovery",
+    "each change of the supervisor's state, begin and end of each step of a protocol, a recovery",
 )
 CONFIG = Topic(
-    "/config", _STRING, "JSON: the controller with all its numbers, the robot, seed and trial"
+    "/config", _STRING, "JSON: the controller with its numbers, robot, seed and trial, protocol"
 )
 CALIBRATION = Topic("/calibration", _STRING, "JSON: the calibration file of each antenna, if any")
 VERSIONS = Topic("/versions", _STRING, "JSON: versions of antennate, Python, NumPy and MuJoCo")
 
+PROTOCOL = "protocol"
+"""Source of the events of a protocol; their texts are `begin NAME`, `end NAME`, `break NAME`."""
 TICK_TOPICS = (ANTENNA, MANEUVER, JOINT_COMMANDS)
 HEADER_TOPICS = (CONFIG, CALIBRATION, VERSIONS)
 TOPICS = (
@@ -245,7 +247,8 @@ TICK = _own(
     + _MANEUVER
     + _COUNTERS
     + "".join(f"float64[] {name}\n" for name in (*JOINTS, *MOTION))
-    + _SUPERVISOR,
+    + _SUPERVISOR
+    + "string[] events\n",
 )
 """A whole tick, on its way from the loop to the process that writes the log."""
 

@@ -27,7 +27,7 @@ from antennate.errors import LogError, reason
 from antennate.files import require_room
 from antennate.telemetry.header import LIBRARY, Header
 from antennate.telemetry.ticks import Columns, Tick, messages_of, ticks_of, uniform
-from antennate.telemetry.topics import EVENTS, Topic, topics_of
+from antennate.telemetry.topics import EVENTS, PROTOCOL, Topic, topics_of
 
 LEAST_FREE = 1e9
 """Room for six hours of ticks at 100 Hz [byte] (assumed)."""
@@ -128,6 +128,7 @@ class LogWriter:
         if tick.state != self._state or not named <= self._told:
             messages.append((EVENTS, self._event(tick, stamp)))
             self._told |= named
+        messages += [(EVENTS, _of_protocol(text, stamp)) for text in tick.events]
         for topic, data in messages:
             self.add(topic, tick.number, stamp, data)
         self._state = tick.state
@@ -261,6 +262,12 @@ class LogWriter:
         with contextlib.suppress(OSError):
             self._file.close()
         raise LogError(f"expected to write {self._called}, found: {self.failure}; {left}") from None
+
+
+def _of_protocol(text: str, stamp: int) -> bytes:
+    """An event of a protocol: a step that begins or ends."""
+    time = divmod(stamp, 10**9)
+    return EVENTS.type.encode(*time, _LEVELS["OFF"], PROTOCOL, text, "", "", 0)
 
 
 class _GoneError(OSError):

@@ -1,10 +1,11 @@
 """The antenna board of the twin: touches of its antennae, its converter, and its frames over UDP.
 
-Only the readings of the standing twin are touched; the simulated antenna itself is not bent.
+Before the physics begins only readings change; `hands` bends the antennae of a robot with torque.
 Orders:
 
 - `left@2s` bends the left antenna for a second, 2 s after a client has begun;
 - `left:20mm@2s` holds it from then on as a ruler beside it is read: its tip pushed 20 mm aside;
+- `left:10mm:60mm@2s` likewise 10 mm aside at 60 mm from its base;
 - `left:60deg@2s` likewise by the sum of its hinge angles; 0mm or 0deg lets go;
 - while the twin runs, `left`, `left:20mm` and so on, at once.
 """
@@ -18,7 +19,7 @@ import struct
 import time
 from collections import deque
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -153,9 +154,22 @@ TOUCH_FLEX = 1.0
 """Flex of a touch [rad]: more than twice what the check by touch asks for."""
 TOUCH_TIME = 1.0
 """Time for which a touch bends an antenna [s]."""
-_TOUCH = re.compile(r"(left|right)(?::([0-9]+(?:\.[0-9]+)?)(mm|deg))?(?:@([0-9]+(?:\.[0-9]+)?)s)?")
+_SIZE = r"([0-9]+(?:\.[0-9]+)?)"
+_TOUCH = re.compile(rf"(left|right)(?::{_SIZE}(deg|mm(?::{_SIZE}mm)?))?(?:@{_SIZE}s)?")
 _LOADS = np.linspace(0.0, 0.15, 61)
-"""Loads on the tip, normal to it [N]; the default antenna moves its tip farthest at 0.12 N."""
+"""Loads on the tip, normal to it [N]; the default antenna moves its tip farthest at 0.12 N. Nearer
+to the base they are larger by the cube of the lengths."""
+
+
+class Press(NamedTuple):
+    """A press on an antenna: flex under its sensor [rad], force normal to it [N], where [m]."""
+
+    flex: float
+    force: float
+    mark: float
+
+
+_NONE = Press(0.0, 0.0, 0.0)
 
 
 class TouchStimulus:
@@ -163,23 +177,26 @@ class TouchStimulus:
 
     Args:
         orders: As above.
-        antenna: The antenna, for its springs and its flex sensor.
+        antenna: The left antenna, for its springs and its flex sensor.
+        right: The right one, as the left one if not given.
     """
 
-    def __init__(self, orders: Sequence[str], antenna: AntennaSpec) -> None:
-        self._antenna = antenna
+    def __init__(
+        self, orders: Sequence[str], antenna: AntennaSpec, right: AntennaSpec | None = None
+    ) -> None:
+        self._antennae = antenna, right or antenna
         self._timed = sorted(
-            (_read_touch(text, antenna, timed=True) for text in orders),
+            (_read_touch(text, self._antennae, timed=True) for text in orders),
             key=lambda order: order[3],
         )
-        self._fresh: deque[tuple[int, float, float]] = deque()
-        self._typed = [(0.0, -math.inf), (0.0, -math.inf)]
+        self._fresh: deque[tuple[int, Press, float]] = deque()
+        self._typed = [(_NONE, -math.inf), (_NONE, -math.inf)]
         self._begun = math.inf
 
     def order(self, text: str) -> None:
         """Take an order, to be carried out at once."""
-        side, flex, length, _ = _read_touch(text, self._antenna, timed=False)
-        self._fresh.append((side, flex, length))
+        side, press, length, _ = _read_touch(text, self._antennae, timed=False)
+        self._fresh.append((side, press, length))
 
     def change(self, t: float, begun: float) -> Floats:
         """Change of both readings [counts] at time t [s], shape (2,).
@@ -188,51 +205,71 @@ class TouchStimulus:
             t: The twin's time.
             begun: When the present client began, inf if none has.
         """
-        if begun != self._begun:  # touches of the last client end
-            self._begun, self._typed = begun, [(0.0, -math.inf), (0.0, -math.inf)]
-        while self._fresh:
-            side, held, length = self._fresh.popleft()
-            self._typed[side] = (held, t + length)
+        ordered = self.presses(t, begun)
         flex = np.zeros(2)
-        for side, held, length, start in self._timed:
+        for side, press, length, start in self._timed:
             if start <= t - begun:
-                flex[side] = held if t - begun < start + length else 0.0
-        for side, (held, end) in enumerate(self._typed):
-            flex[side] = held if t < end else flex[side]
-        sensor = self._antenna.sensor
+                flex[side] = press.flex if t - begun < start + length else 0.0
+        for side, press in enumerate(ordered):
+            flex[side] = flex[side] if press is None else press.flex
+        sensor = self._antennae[0].sensor
         return counts(sensor, flex) - counts(sensor, np.zeros(2))
 
+    def presses(self, t: float, begun: float) -> list[Press | None]:
+        """What presses the left and the right antenna by an order; arguments as of `change`."""
+        if begun != self._begun:  # touches of the last client end
+            self._begun, self._typed = begun, [(_NONE, -math.inf), (_NONE, -math.inf)]
+        while self._fresh:
+            side, press, length = self._fresh.popleft()
+            self._typed[side] = (press, t + length)
+        return [press if t < end else None for press, end in self._typed]
 
-def _read_touch(text: str, antenna: AntennaSpec, timed: bool) -> tuple[int, float, float, float]:
-    """Side, flex [rad], for how long [s] and when [s] of an order."""
+
+def _read_touch(
+    text: str, antennae: Sequence[AntennaSpec], timed: bool
+) -> tuple[int, Press, float, float]:
+    """Side, press, for how long [s] and when [s] of an order."""
     match = _TOUCH.fullmatch(text.strip())
-    if match is None or (match[4] is None) is timed:
+    if match is None or (match[5] is None) is timed:
         when = "@Ts, with T in seconds" if timed else "nothing more"
         raise BadInputError(
-            f"--touch: expected left or right, with or without :20mm or :60deg, then {when}, "
-            f"found {text!r}"
+            f"--touch: expected left or right, with or without :20mm, :10mm:60mm or :60deg, then "
+            f"{when}, found {text!r}"
         )
-    if match[2] is None:
-        flex, length = TOUCH_FLEX, TOUCH_TIME
+    antenna = antennae[SIDES.index(match[1])]
+    mark = 1e-3 * float(match[4]) if match[4] else antenna.length
+    if match[2] is None or match[3] == "deg":
+        flex = TOUCH_FLEX if match[2] is None else math.radians(float(match[2]))
+        press = _press(antenna, mark, flex=flex)
     else:
-        size, length = float(match[2]), math.inf
-        flex = math.radians(size) if match[3] == "deg" else _flex_of(1e-3 * size, antenna)
-    return SIDES.index(match[1]), flex, length, float(match[4] or 0.0)
+        press = _press(antenna, mark, way=1e-3 * float(match[2]))
+    length = TOUCH_TIME if match[2] is None else math.inf
+    return SIDES.index(match[1]), press, length, float(match[5] or 0.0)
 
 
-def _flex_of(way: float, antenna: AntennaSpec) -> float:
-    """Flex [rad] of an antenna whose tip is pushed aside by so much [m], by the statics."""
+def _press(antenna: AntennaSpec, mark: float, flex: float | None = None, way: float = 0.0) -> Press:
+    """The press at a place [m] that gives a flex [rad] or moves it aside [m], by the statics."""
     chain = Chain.of(antenna)
-    force = np.stack([np.zeros_like(_LOADS), _LOADS], axis=1)
-    bent = equilibrium(chain, np.full(len(_LOADS), chain.length), force, follower=True).angles
-    ways, flexes = shape(chain, bent)[:, -1, 1], bent[:, : antenna.sensed_hinges].sum(axis=1)
+    if not 0.0 < mark <= chain.length:
+        most = f"{1e3 * chain.length:g}mm along the antenna"
+        raise BadInputError(f"--touch: expected a place of up to {most}, found {1e3 * mark:g}mm")
+    loads = _LOADS * (chain.length / mark) ** 3
+    force = np.stack([np.zeros_like(loads), loads], axis=1)
+    bent = equilibrium(chain, np.full(len(loads), mark), force, follower=True).angles
+    flexes = bent[:, : antenna.sensed_hinges].sum(axis=1)
+    if flex is not None:
+        return Press(flex, float(np.interp(flex, flexes, loads)), mark)
+    ends = np.append(chain.starts, chain.length)
+    ways = np.array([np.interp(mark, ends, across) for across in shape(chain, bent)[:, :, 1]])
     most = int(np.argmax(ways))
     if way > ways[most]:
         raise BadInputError(
             f"--touch: expected at most {1e3 * ways[most]:.0f}mm for this antenna, found "
             f"{1e3 * way:g}mm"
         )
-    return float(np.interp(way, ways[: most + 1], flexes[: most + 1]))
+    rising = slice(most + 1)
+    flex, load = (float(np.interp(way, ways[rising], each[rising])) for each in (flexes, loads))
+    return Press(flex, load, mark)
 
 
 _ALIVE = 0.1

@@ -137,7 +137,7 @@ def watched(config: TwinConfig, boot_id: int | None = None) -> tuple[TwinRobot, 
     body = SimRobot(1, config.robot, period, config.physics.timestep)
     body.load(0, start.world, start.chance)
     boot = config.trial + 1 if boot_id is None else boot_id
-    touch = TouchStimulus(config.touch, config.robot.antenna)
+    touch = TouchStimulus(config.touch, config.robot.antenna, config.robot.right_antenna)
     passage = Passage(start.scene)
     robot = TwinRobot(
         body,

@@ -4,6 +4,7 @@
     only NAME, next            plug in this one alone, or the next one alone
     push NAME=ANGLE            turn a shaft without torque
     touch left:20mm            hold an antenna, or `touch left` for a second; 0mm lets go
+    hang, floor                raise the robot by its middle link, or put it down
     fault servo:7=silent       let a fault begin; `fault servo:7=none` takes it back
 
 NAME is a joint, the place of a servo in its list (from 1 on), or `all`. A turn of a shaft takes
@@ -25,8 +26,8 @@ from dynamixel_bus.servo import Servo
 
 _CHUNK = 4096
 _WORDS = (
-    "plug NAME, unplug NAME, only NAME, next, push NAME=ANGLE, or of a robot touch SIDE[:SIZE] or "
-    "fault FAULT"
+    "plug NAME, unplug NAME, only NAME, next, push NAME=ANGLE, or of a robot touch SIDE[:SIZE], "
+    "hang, floor or fault FAULT"
 )
 NONE = "none"
 TURNING = 0.5

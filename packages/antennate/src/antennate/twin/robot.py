@@ -21,6 +21,7 @@ from antennate.robots.spec import RobotSpec
 from antennate.sim.sim_robot import SimRobot
 from antennate.sim.world import World
 from antennate.twin.board import Converter, ImuReadings, TouchStimulus
+from antennate.twin.hands import Hands
 from antennate.twin.orders import Plugging, Pushes
 from antennate.twin.servos import Battery, DrivenServo, Visit, servos_of
 from antennate.types import AntennaFrame, Floats
@@ -73,6 +74,7 @@ class TwinRobot:
         on_return: Called when the robot is carried back to the start, for another drive.
         noise: What the board's wire does to bytes, both ways.
         battery: What feeds the servos.
+        hands: What presses and holds the robot while the physics runs.
     """
 
     def __init__(
@@ -107,7 +109,8 @@ class TwinRobot:
         self.imu: ImuReadings | None = None
         if robot.has_imu:
             self.imu = ImuReadings(robot.imu, period, boot_id if standing_noise else None)
-        self.touch = touch or TouchStimulus((), robot.antenna)
+        self.touch = touch or TouchStimulus((), robot.antenna, robot.right_antenna)
+        self.hands = Hands(body.world(0))
         self.on_return: Callable[[], None] = lambda: None
         self.t = 0.0
         self.board_silent = False
@@ -178,6 +181,7 @@ class TwinRobot:
         if self._standing and not torque:
             return None
         self._standing = False
+        self.hands.presses = self.touch.presses(self.t, self._visit.begun)
         end = (self._ticks + 1) * self._period
         pulls = [servo.pull(end, self._period) for servo in self.servos]
         driven = [servo.motion.driven for servo in self.servos]
@@ -274,6 +278,7 @@ class TwinRobot:
     def _carry_back(self) -> None:
         """Put the robot where the trial began, as a person does between two drives."""
         self._body.put_back(0, self._start)
+        self.hands.clear()
         self._standing = True
         for servo, ticks in zip(
             self.servos, self._joints.positions(self._body.world(0).drives()).tolist(), strict=True

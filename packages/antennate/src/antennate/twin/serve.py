@@ -217,6 +217,8 @@ class TwinServer(_OrderedServer):
         word, _, rest = text.partition(" ")
         if word == "touch":
             self._robot.order_touch(rest)
+        elif text in ("hang", "floor"):
+            self._robot.hands.hanging = text == "hang"
         elif word == "fault":
             self._faults.order(rest)
         else:

@@ -106,6 +106,8 @@ def connect(
 
 def _controller(config: DriveConfig) -> Controller:
     """The controller that is named; by keys it does not walk, but the gait does."""
+    if config.protocol:  # each step has its own frequency
+        return make_controller(config.controller, config.control, config.robot, walks=False)
     if not (walks := config.reader == config.controller):
         config.robot.require_pace("control.gait.frequency", config.control.gait.frequency)
     return make_controller(config.controller, config.control, config.robot, walks=walks)

@@ -77,6 +77,8 @@ class Session:
         touched: Whether anything was written to the actuators.
         approaching: Whether the joints are on their way to the first command since torque came on.
         unrecorded: Whether a record that is required is not kept; the robot holds meanwhile.
+        note: What its controller tells a person, for the status line.
+        events: What began or ended with this tick, of a protocol.
         unfit: What of the robot's own description speaks against torque, in words; set by
             `prepare`, empty if nothing does.
     """
@@ -108,7 +110,8 @@ class Session:
         self._slow = period * min(1.0, self._limits.approach / max(actuators.robot.fastest))
         self._fresh = self.approaching = False
         self.lost = self.touched = self.unrecorded = False
-        self.unfit = ""
+        self.unfit = self.note = ""
+        self.events: tuple[str, ...] = ()
 
     @property
     def mute(self) -> bool:
@@ -118,6 +121,7 @@ class Session:
     def read(self) -> AntennaFrame:
         """The newest reading; NaN if it is not good or while the supervisor stops the gait."""
         now, out, control = self.clock.now(), self.outputs, self.control
+        self.events = ()
         if self.timing is None:
             self.timing = LoopTiming(now, self.period)
         self.timing.begin(now)
