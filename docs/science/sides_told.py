@@ -1,7 +1,7 @@
 """What the readings of docs/science/sides.py tell: `python docs/science/sides_told.py FOLDER`.
 
 By the criterion of docs/science/sides.md. It needs scikit-learn (`uv run --with scikit-learn`) and
-writes docs/science/sides_PLAN.json and, of the screening, sides.png beside itself.
+writes docs/science/sides_PLAN.json and sides.png beside itself.
 """
 
 from __future__ import annotations
@@ -512,8 +512,7 @@ def _by_scene(signed: Floats, scenes: Any) -> dict[str, float]:
 
 def score_of(design: dict[str, Any]) -> float:
     """The better moment's mean AUC over estimators, of the antennae alone."""
-    moments = (design[moment]["antennae"] for moment in WINDOWS)
-    return max(float(np.mean([e["auc"] for e in moment.values()])) for moment in moments)
+    return max(mean_area(design[moment]["antennae"]) for moment in WINDOWS)
 
 
 def smoothed(scores: dict[str, float]) -> dict[str, float]:
@@ -540,27 +539,44 @@ def reach_of(design: Design) -> float:
     return design.robot.antenna.base_spacing / 2 + design.length * widest
 
 
+def mean_area(estimators: dict[str, Any]) -> float:
+    """Mean AUC of all estimators."""
+    return float(np.mean([estimator["auc"] for estimator in estimators.values()]))
+
+
 @styled
-def figure(result: dict[str, Any]) -> Figure:
-    """AUC against reach over half the width, a panel for each moment."""
-    drawing, known = canvas(WIDTH, 3.2), designs()
+def figure(screening: dict[str, Any], best: dict[str, Any] | None) -> Figure:
+    """AUC against reach over half the width, a panel for each moment; the ten best again."""
+    drawing, known = canvas(WIDTH, 3.4), designs()
     panels = drawing.subplots(1, 2, sharey=True)
     for panel, moment in zip(panels, WINDOWS, strict=True):
         for motion, colour in zip(AXES["motion"], SERIES, strict=False):
-            names = [n for n in result["designs"] if known[n].motion == motion]
-            reach = [reach_of(known[name]) / HALF_WIDTH for name in names]
-            told = [
-                np.mean([e["auc"] for e in result["designs"][n][moment]["antennae"].values()])
-                for n in names
-            ]
-            panel.plot(reach, told, "o", color=colour, markersize=4, label=motion)
+            for designs_of, marks in ((screening, {"alpha": 0.45}), (best, {"marker": "D"})):
+                names = [n for n in (designs_of or {}) if known[n].motion == motion]
+                reach = [reach_of(known[name]) / HALF_WIDTH for name in names]
+                told = [mean_area((designs_of or {})[n][moment]["antennae"]) for n in names]
+                label = motion if designs_of is screening else None
+                style: dict[str, Any] = {"marker": "o", "markersize": 4, "label": label} | marks
+                panel.plot(reach, told, linestyle="none", color=colour, **style)
         for level in (0.5, 0.8):
             panel.axhline(level, color=INK, linewidth=0.6)
-        panel.set_title(moment, loc="left", fontsize=8)
-        panel.set_xlabel("reach to the side over half the width")
+        panel.set_title({"jammed": "when jammed", "decision": "after backing off"}[moment])
+        panel.set_ylim(0.3, 0.85)
     panels[0].set_ylabel("AUC of the side, antennae alone")
-    panels[0].legend(fontsize=7)
+    drawing.supxlabel("reach of the tip to the side over half the corridor", fontsize=9)
+    handles, labels = panels[0].get_legend_handles_labels()
+    drawing.legend(
+        handles, labels, loc="outside upper left", ncols=5, fontsize=8, columnspacing=1.0
+    )
     return drawing
+
+
+def draw() -> None:
+    """Draw what the written files hold."""
+    screening, best = (HERE / f"sides_{plan}.json" for plan in ("screening", "best"))
+    ten = json.loads(best.read_text())["designs"] if best.exists() else None
+    drawing = figure(json.loads(screening.read_text())["designs"], ten)
+    HERE.joinpath("sides.png").write_bytes(render(drawing)["png"])
 
 
 def main(argv: list[str]) -> None:
@@ -593,11 +609,10 @@ def main(argv: list[str]) -> None:
     if asked.plan != "smoke":
         text = json.dumps(result, indent=1) + "\n"
         HERE.joinpath(f"sides_{asked.plan}.json").write_text(text)
-    if asked.plan == "screening":
-        HERE.joinpath("sides.png").write_bytes(render(figure(result))["png"])
+        draw()
     for name, design in result["designs"].items():
         cells = [
-            f"{moment} {label} {np.mean([e['auc'] for e in design[moment][label].values()]):.2f}"
+            f"{moment} {label} {mean_area(design[moment][label]):.2f}"
             for moment in WINDOWS
             for label in SETS
         ]
