@@ -607,7 +607,7 @@ def main(argv: list[str]) -> None:
     ranked = sorted(rank, key=lambda name: -rank[name])
     result["designs"] = {name: result["designs"][name] for name in ranked}
     if asked.plan != "smoke":
-        text = json.dumps(result, indent=1) + "\n"
+        text = json.dumps(result, separators=(",", ":")) + "\n"
         HERE.joinpath(f"sides_{asked.plan}.json").write_text(text)
         draw()
     for name, design in result["designs"].items():
