@@ -1,0 +1,285 @@
+"""Steps in the air: parameters by robust least squares over simulations of them.
+
+A simulation in the air is smooth in its parameters and its paths do not part, so that every tick
+counts. Simulations of one step for one change of one parameter are tasks for workers; a parameter
+is changed only where the joints that move depend on it.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy.optimize import lsq_linear
+
+from antennate.robots.spec import RobotSpec
+from antennate.studies.pool import Workers, gather
+from antennate.studies.trials import OnStep, no_step
+from antennate.types import Bools, Floats, Ints
+from antennate_lab.fit.parameters import Parameter, bounds, changed
+from antennate_lab.fit.residuals import NOISE, channels, labels, moving, pieces
+from antennate_lab.fit.simulated import Course, simulated
+
+ROBUST = 3.0
+"""Residuals beyond so many standard deviations count in proportion, not by their square."""
+DRAWS = 400
+"""Draws of a bootstrap."""
+_ROUNDS = 15
+"""Most steps of a search."""
+_ENOUGH = 3e-4
+"""A search is done when a step improves the cost by less than this share."""
+_MOST_DAMPING = 1e3
+"""A search is done, too, when no shorter step than that of this damping improves it."""
+
+
+def _channels_of(robot: RobotSpec, course: Course) -> Floats:
+    """Channels of a simulated course; far off where the simulation fails."""
+    from antennate.errors import SimulationError
+
+    try:
+        return channels(robot, simulated(robot, course))
+    except SimulationError:
+        return np.full_like(channels(robot, course), 10.0)
+
+
+@dataclass
+class Problem:
+    """Courses, and the parameters that are searched in them.
+
+    Attributes:
+        robot: The robot that the search begins with.
+        courses: Courses in the air.
+        chosen: The parameters.
+        workers: Where simulations run.
+        on_step: Told of each round.
+    """
+
+    robot: RobotSpec
+    courses: Sequence[Course]
+    chosen: Sequence[Parameter]
+    workers: Workers
+    on_step: OnStep = no_step
+    noise: list[Floats] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        """Begin with the least noise of each channel."""
+        self.noise = self.least = [
+            np.array([NOISE[kind] for kind, _ in labels(self.robot, course)])
+            for course in self.courses
+        ]
+        self.measured = [channels(self.robot, course) for course in self.courses]
+        self.told = np.array([self._tells(course) for course in self.courses]).reshape(
+            len(self.courses), len(self.chosen)
+        )
+        self.start = np.array([each.searched(each.start) for each in self.chosen])
+        self.spread = np.array([each.scale.spread for each in self.chosen])
+
+    def _tells(self, course: Course) -> Bools:
+        """Which parameters change what is measured in a course."""
+        joints = moving(course).tolist()
+        servos = {self.robot.servo_names[joint] for joint in joints}
+        own = {self.robot.joint_names[joint] for joint in joints}
+        reads = any(kind == "counts" for kind, _ in labels(self.robot, course))
+
+        def depends(each: Parameter) -> bool:
+            group, _, rest = each.path.partition(".")
+            if group == "servos":
+                return rest.partition(".")[0] in servos
+            if group == "legs":
+                return not own.isdisjoint(self.robot.leg_names)
+            if group == "yaw":
+                return self.robot.yaw_names[each.place or 0] in own
+            return reads
+
+        return np.array([depends(each) for each in self.chosen], bool)
+
+    def made(self, x: Floats) -> RobotSpec:
+        """The robot at a place of the search."""
+        values = [each.value(at) for each, at in zip(self.chosen, x.tolist(), strict=True)]
+        return changed(self.robot, self.chosen, values)
+
+    def predictions(self, places: Sequence[tuple[Floats, Ints]]) -> list[list[Floats]]:
+        """Channels of some courses at each of several places of the search."""
+        tasks = [(self.made(x), self.courses[i]) for x, which in places for i in which]
+        found = iter(gather(_channels_of, tasks, self.workers, no_step))
+        return [list(itertools.islice(found, len(which))) for _, which in places]
+
+    def residuals(self, predicted: Sequence[Floats]) -> list[Floats]:
+        """Residuals of all courses in units of the noise, each (n, C)."""
+        parts = zip(predicted, self.measured, self.noise, strict=True)
+        return [(simulated - measured) / noise for simulated, measured, noise in parts]
+
+    def cost(self, x: Floats, predicted: Sequence[Floats]) -> float:
+        """Robust cost of a place, soft L1, the prior too."""
+        spread = sum(
+            float((np.sqrt(1.0 + (each / ROBUST) ** 2) - 1.0).sum())
+            for each in self.residuals(predicted)
+        )
+        return ROBUST**2 * spread + 0.5 * float((self.prior(x) ** 2).sum())
+
+    def slopes(self, x: Floats, predicted: Sequence[Floats]) -> list[Floats]:
+        """Change of the residuals with each parameter, one simulation for each that is told."""
+        steps = np.array([each.scale.nudge for each in self.chosen])
+        steps = np.where(x + steps > bounds(self.chosen)[1], -steps, steps)
+        places = [
+            (x + step * np.eye(len(x))[p], np.flatnonzero(self.told[:, p]))
+            for p, step in enumerate(steps)
+        ]
+        slopes = [np.zeros((*each.shape, len(x))) for each in predicted]
+        for p, found in enumerate(self.predictions(places)):
+            for i, moved in zip(places[p][1].tolist(), found, strict=True):
+                slopes[i][:, :, p] = (moved - predicted[i]) / self.noise[i] / steps[p]
+        return slopes
+
+    def prior(self, x: Floats) -> Floats:
+        """How far a place is from what was known before, in its standard deviations."""
+        return (x - self.start) / self.spread
+
+
+@dataclass(frozen=True)
+class Solution:
+    """What a search has found.
+
+    Attributes:
+        x: Place of the best parameters, shape (P,).
+        cost: Robust cost there.
+        residuals: Residuals of all courses there, each (n, C).
+        slopes: Change of them with each parameter, each (n, C, P).
+    """
+
+    x: Floats
+    cost: float
+    residuals: list[Floats]
+    slopes: list[Floats]
+
+
+def solve(problem: Problem, begin: Floats, rounds: int = _ROUNDS) -> Solution:
+    """Best parameters from a place on.
+
+    Levenberg and Marquardt's steps, each within the bounds by SciPy's `lsq_linear`. The noise of a
+    channel is at least what its residuals are at present, so that a start that is far off counts
+    all of them, and the last rounds the outliers less.
+    """
+    low, high = bounds(problem.chosen)
+    x = np.clip(begin, low, high)
+    predicted = problem.predictions([(x, np.arange(len(problem.courses)))])[0]
+    damping = 1e-3
+    for number in range(rounds):
+        problem.noise = noises(problem, predicted)
+        cost = problem.cost(x, predicted)
+        residuals, slopes = problem.residuals(predicted), problem.slopes(x, predicted)
+        bend, pull = _normal(problem, x, residuals, slopes)
+        small = False
+        while damping < _MOST_DAMPING:
+            step = _bounded(bend, pull, damping, low - x, high - x)
+            new = problem.predictions([(x + step, np.arange(len(problem.courses)))])[0]
+            gain = cost - problem.cost(x + step, new)
+            damping = damping / 10.0 if gain > 0.0 else damping * 10.0
+            if gain > 0.0:
+                x, predicted, small = x + step, new, gain < _ENOUGH * cost
+                break
+        problem.on_step(number + 1, rounds)
+        if small or damping >= _MOST_DAMPING:
+            break
+    problem.noise = noises(problem, predicted)
+    slopes = problem.slopes(x, predicted)
+    return Solution(x, problem.cost(x, predicted), problem.residuals(predicted), slopes)
+
+
+def _normal(
+    problem: Problem, x: Floats, residuals: list[Floats], slopes: list[Floats]
+) -> tuple[Floats, Floats]:
+    """Curvature (P, P) and slope (P,) of the robust cost after Gauss and Newton, the prior too."""
+    bend, pull = np.diag(problem.spread**-2.0), problem.prior(x) / problem.spread
+    for residual, slope in zip(residuals, slopes, strict=True):
+        weight = _weight(residual).ravel()
+        rows = slope.reshape(len(weight), -1)
+        bend = bend + (rows * weight[:, None]).T @ rows
+        pull = pull + rows.T @ (weight * residual.ravel())
+    return bend, pull
+
+
+def _weight(residual: Floats) -> Floats:
+    """What residuals count, less for outliers: soft L1."""
+    return 1.0 / np.sqrt(1.0 + (residual / ROBUST) ** 2)
+
+
+def _bounded(bend: Floats, pull: Floats, damping: float, low: Floats, high: Floats) -> Floats:
+    """The damped step of least cost between two ends."""
+    damped = bend + damping * np.diag(np.diag(bend))
+    root = np.linalg.cholesky(damped).T
+    ends = (np.minimum(low, -1e-12), np.maximum(high, 1e-12))
+    return np.asarray(lsq_linear(root, -np.linalg.solve(root.T, pull), ends, method="bvls").x)
+
+
+def noises(problem: Problem, predicted: Sequence[Floats]) -> list[Floats]:
+    """Noise of each channel, at least the least one, from the residuals of predictions."""
+    parts = zip(problem.least, predicted, problem.measured, strict=True)
+    return [
+        np.maximum(least, np.sqrt(((simulated - measured) ** 2).mean(axis=0)))
+        for least, simulated, measured in parts
+    ]
+
+
+def covariances(
+    problem: Problem, solution: Solution, rng: np.random.Generator
+) -> tuple[Floats, Floats]:
+    """Covariance of the parameters by the local Hessian, and changes in a bootstrap over pieces.
+
+    The bootstrap draws pieces of the courses, each course's own, and goes one Gauss-Newton step
+    from the solution.
+
+    Returns:
+        Covariance, shape (P, P), and changes, shape (DRAWS, P).
+    """
+    size = len(problem.chosen)
+    bends, pulls = [], []
+    prior = np.diag(problem.spread**-2.0)
+    for course, residual, slope in zip(
+        problem.courses, solution.residuals, solution.slopes, strict=True
+    ):
+        weight = _weight(residual)
+        number = pieces(course)
+        for k in range(number[-1] + 1):
+            rows = slope[number == k].reshape(-1, size)
+            w, r = weight[number == k].ravel(), residual[number == k].ravel()
+            bends.append((rows * w[:, None]).T @ rows)
+            pulls.append(rows.T @ (w * r))
+    owner = np.repeat(
+        np.arange(len(problem.courses)), [pieces(c)[-1] + 1 for c in problem.courses]
+    )
+    bend, pull = np.array(bends), np.array(pulls)
+    pinned = _pinned(problem, solution.x)
+    draws = []
+    for _ in range(DRAWS):
+        times = _drawn(owner, rng)
+        curvature = np.tensordot(times, bend, 1) + prior
+        slope = (times[:, None] * pull).sum(axis=0) + problem.prior(solution.x) / problem.spread
+        draws.append(-np.linalg.solve(curvature, slope * ~pinned))
+    whole = np.linalg.inv(bend.sum(axis=0) + prior)
+    return whole, np.array(draws)
+
+
+def _pinned(problem: Problem, x: Floats) -> Bools:
+    """Parameters at an end of the search: what pulls them outwards says nothing."""
+    low, high = bounds(problem.chosen)
+    near = 1e-3 * (high - low)
+    return (x < low + near) | (x > high - near)
+
+
+def _drawn(owner: Ints, rng: np.random.Generator) -> Floats:
+    """How often each piece is drawn, as many of each course as it has, shape (pieces,)."""
+    times = np.zeros(len(owner))
+    for course in range(owner[-1] + 1):
+        own = np.flatnonzero(owner == course)
+        times += np.bincount(rng.choice(own, len(own)), minlength=len(owner))
+    return times
+
+
+def best_start(problem: Problem, starts: Sequence[Floats], few: Callable[[], Problem]) -> Floats:
+    """The place of several from which a short search over few courses ends lowest."""
+    small = few()
+    found = [solve(small, start, rounds=5) for start in starts]
+    return min(found, key=lambda each: each.cost).x

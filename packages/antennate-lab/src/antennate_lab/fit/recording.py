@@ -1,0 +1,185 @@
+"""A log of a protocol as courses, and what is wrong with it.
+
+Ticks are laid on a grid of the control period: a command holds until the next one, what is measured
+is taken between two ticks.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from antennate.errors import BadInputError
+from antennate.robots.spec import RobotSpec
+from antennate.telemetry.header import parts
+from antennate.telemetry.reader import LogReader
+from antennate.telemetry.steps import LoggedStep, protocol_of, steps
+from antennate.telemetry.ticks import Tick
+from antennate.types import Floats
+from antennate_lab.fit.simulated import Course
+
+DRIFT = 0.003
+"""A clock that runs fast or slow by more of its time is named (assumed: a crystal has 0.0001)."""
+FEWEST = 50
+"""Fewest ticks of a step that can be compared."""
+_LOST = 0.05
+"""A step with a larger share of ticks without a measurement is left out."""
+_PARTS = ("links", "joint_names", "servo_names", "ids")
+"""What a log and a robot's file must agree on."""
+
+
+@dataclass(frozen=True)
+class Recording:
+    """One log of a protocol.
+
+    Attributes:
+        name: Name of its file, without the ending.
+        sha256: Hash of its bytes.
+        courses: Steps that can be compared.
+        left_out: Steps of the protocol that cannot, and why.
+        warnings: What else is wrong with the log.
+    """
+
+    name: str
+    sha256: str
+    courses: list[Course]
+    left_out: dict[str, str]
+    warnings: list[str]
+
+
+def read(path: Path, robot: RobotSpec) -> Recording:
+    """Read a log.
+
+    Args:
+        path: Its first file.
+        robot: The robot that it is taken for.
+
+    Raises:
+        BadInputError: It is a log of another robot, or of no protocol, or holds no whole step.
+    """
+    with LogReader(path) as log:
+        _require_same(path, log.header.robot, robot)
+        period = log.header.params.period
+        planned = [step.called for step in protocol_of(log).steps]
+        ticks = {tick.number: tick for tick in log}
+    found = {step.name: step for step in steps(path) if step.whole}
+    left_out = {name: "the log does not hold it to its end" for name in planned if name not in found}
+    courses = []
+    for step in found.values():
+        if step.place == "hand":
+            left_out[step.name] = "what a hand did is not in the log"
+            continue
+        own = [ticks[n] for n in range(step.begin, step.end) if n in ticks]
+        course, why = _course(step, own, robot, period)
+        if course is None:
+            left_out[step.name] = why
+        else:
+            courses.append(course)
+    if not courses:
+        raise BadInputError(
+            f"{path}: expected whole steps with measured positions, found none of {len(planned)}"
+        )
+    warnings = _drift(list(ticks.values()), period)
+    missing = [name for name in planned if name not in found]
+    if missing:
+        warnings.append(
+            f"{len(missing)} of {len(planned)} steps of the protocol are missing, from "
+            f"{missing[0]} on; give the folder to `drive --protocol` again to record them"
+        )
+    return Recording(path.stem, _hash(path), courses, left_out, warnings)
+
+
+def _require_same(path: Path, logged: RobotSpec, robot: RobotSpec) -> None:
+    """Refuse the log of a robot with other joints or servos."""
+    for name in _PARTS:
+        ours, theirs = getattr(robot, name), getattr(logged, name)
+        if ours != theirs:
+            raise BadInputError(
+                f"{path}: expected the robot of --robot with {name} {_shown(ours, theirs)}, found "
+                f"{_shown(theirs, ours)}; give the file of the robot that was driven"
+            )
+
+
+def _shown(value: object, other: object) -> str:
+    """A value; of a list the first entry that the other list has not."""
+    if not isinstance(value, tuple) or not isinstance(other, tuple):
+        return str(value)
+    pairs = zip(value, [*other, *[None] * len(value)], strict=False)
+    return next((str(own) for own, theirs in pairs if own != theirs), f"of {len(value)} joints")
+
+
+def _course(
+    step: LoggedStep, ticks: list[Tick], robot: RobotSpec, period: float
+) -> tuple[Course | None, str]:
+    """A step on the grid of the control period, or why there is none."""
+    if len(ticks) < FEWEST:
+        return None, f"it has {len(ticks)} ticks, fewer than {FEWEST}"
+    now = np.array([tick.now for tick in ticks])
+    positions = np.array([tick.positions for tick in ticks])
+    commands = np.array([tick.angles for tick in ticks])
+    if positions.ndim < 2 or not positions.shape[1]:
+        return None, "no positions were measured"
+    known = np.isfinite(positions).all(axis=1) & np.isfinite(commands).all(axis=1)
+    if known.mean() < 1.0 - _LOST:
+        return None, f"positions are missing in {1.0 - known.mean():.0%} of its ticks"
+    grid = np.arange(round((now[-1] - now[0]) / period) + 1) * period + now[0]
+    held = np.clip(np.searchsorted(now, grid + period / 2) - 1, 0, None)
+    felt = [np.array([getattr(t, what) for t in ticks]) for what in ("angular_velocity", "reading")]
+    walks = step.place == "floor" and step.step.maneuver != "HOLD"
+    return (
+        Course(
+            name=step.name,
+            hanging=step.place == "hanging",
+            period=period,
+            cycle=1.0 / step.step.frequency if walks else 0.0,
+            commands=commands[held],
+            positions=_between(grid, now, positions),
+            gyro=_between(grid, now, felt[0].reshape(len(ticks), -1)),
+            counts=_between(grid, now, felt[1])[:, : robot.antenna_count],
+        ),
+        "",
+    )
+
+
+def _between(grid: Floats, now: Floats, values: Floats) -> Floats:
+    """Values (n, k) at the times of a grid; those that are not known are taken from the others."""
+    columns = [np.full(len(grid), np.nan) for _ in range(values.shape[1])]
+    for at, column in enumerate(values.T):
+        known = np.isfinite(column)
+        if known.sum() > FEWEST // 2:
+            columns[at] = np.interp(grid, now[known], column[known])
+    return np.array(columns).T.reshape(len(grid), values.shape[1])
+
+
+def _drift(ticks: list[Tick], period: float) -> list[str]:
+    """What the clocks of a log say of one another."""
+    now, board = (np.array([getattr(tick, name) for tick in ticks]) for name in ("now", "t"))
+    known = np.isfinite(board)
+    told = []
+    if known.sum() > FEWEST and np.ptp(now[known]) > 0.0:
+        slope = float(np.polyfit(now[known] - now[0], board[known] - board[known][0], 1)[0])
+        if abs(slope - 1.0) > DRIFT:
+            told.append(
+                f"the clock of the antenna board runs {100 * (slope - 1.0):+.1f} % against that of "
+                "the loop: speeds and gyroscope are wrong by as much"
+            )
+    tick = float(np.median(np.diff(now)))
+    if abs(tick / period - 1.0) > DRIFT:
+        told.append(
+            f"a tick lasts {1e3 * tick:.3f} ms, the control period is {1e3 * period:g} ms: the "
+            f"clock of the loop runs {100 * (tick / period - 1.0):+.1f} %, or the loop was late"
+        )
+    return told
+
+
+def _hash(path: Path) -> str:
+    """Hash of all files of a log."""
+    whole = hashlib.sha256()
+    for part in parts(path):
+        with part.open("rb") as file:
+            for piece in iter(lambda: file.read(1 << 20), b""):
+                whole.update(piece)
+    return whole.hexdigest()

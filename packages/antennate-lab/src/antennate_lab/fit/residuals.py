@@ -1,0 +1,99 @@
+"""How far a simulated course is from the measured one, in units of the noise, channel by channel.
+
+Channels are what does not diverge: the angles of the joints that move, in the air also the
+gyroscope about the vertical axis and the readings of the antennae, which swing with what moves.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from antennate.robots.spec import RobotSpec
+from antennate.types import Floats, Ints
+from antennate_lab.fit.simulated import Course
+from dynamixel_bus.model import POSITION_UNIT
+
+MOVES = 0.02
+"""A joint that is told to move by less rests [rad]."""
+PIECE = 0.5
+"""Length of the pieces of a course over which a bootstrap draws [s]."""
+NOISE = {"position": POSITION_UNIT / 12**0.5, "gyro": 0.01, "counts": 3.0}
+"""Least noise of a channel, by its kind: rounding [rad], [rad/s], [counts] (assumed)."""
+YAW_AXIS = 2
+
+
+def moving(course: Course) -> Ints:
+    """Places of the joints that are told to move."""
+    return np.flatnonzero(np.ptp(course.commands, axis=0) > MOVES)
+
+
+def merged(robot: RobotSpec, courses: Sequence[Course]) -> list[Course]:
+    """Courses in the air, those of joints that do not feel one another as one.
+
+    Legs are light beside the body, and so are antennae, so that one simulation shows all of a kind.
+    """
+    groups: defaultdict[object, list[Course]] = defaultdict(list)
+    for at, course in enumerate(courses):
+        kinds = {_kind(robot, joint) for joint in moving(course).tolist()}
+        (kind,) = kinds if len(kinds) == 1 else (str(at),)
+        groups[at if kind == "yaw" else kind, len(course.commands)].append(course)
+    return [_one(robot, *group) for group in groups.values()]
+
+
+def _kind(robot: RobotSpec, joint: int) -> str:
+    """Group of a joint; pitch joints and elevations count as yaw joints, which move all others."""
+    for name in ("legs", "antennae"):
+        places = robot.places(name)
+        if places.start <= joint < places.stop:
+            return name
+    return "yaw"
+
+
+def _one(robot: RobotSpec, first: Course, *others: Course) -> Course:
+    """Courses of joints that do not feel one another as one: each channel from its own course."""
+    if not others:
+        return first
+    commands, positions, counts = (
+        part.copy() for part in (first.commands, first.positions, first.counts)
+    )
+    bases = robot.places("antennae")
+    for course in others:
+        for joint in moving(course).tolist():
+            commands[:, joint] = course.commands[:, joint]
+            positions[:, joint] = course.positions[:, joint]
+            if bases.start <= joint < bases.stop:
+                side = joint - bases.start
+                counts[:, side] = course.counts[:, side]
+    name = f"{first.name} and {len(others)} others"
+    return replace(first, name=name, commands=commands, positions=positions, counts=counts)
+
+
+def labels(robot: RobotSpec, course: Course) -> list[tuple[str, str]]:
+    """Kind and name of each channel of a course in the air, in the order of `channels`."""
+    joints = moving(course).tolist()
+    names = [("position", robot.joint_names[joint]) for joint in joints]
+    kinds = {_kind(robot, joint) for joint in joints}
+    if "yaw" in kinds and course.gyro.size:
+        names.append(("gyro", "gyro"))
+    if kinds - {"legs"} and course.counts.size:
+        names += [("counts", side) for side in ("left", "right")]
+    return names
+
+
+def channels(robot: RobotSpec, course: Course) -> Floats:
+    """Channels of a course in the air, shape (n, C); gyroscope and readings about their median."""
+    kinds = {kind for kind, _ in labels(robot, course)}
+    parts = [course.positions[:, moving(course)]]
+    for kind, values in (("gyro", course.gyro[:, YAW_AXIS:]), ("counts", course.counts)):
+        if kind in kinds:
+            parts.append(values - np.median(values, axis=0))
+    return np.nan_to_num(np.concatenate(parts, axis=1))
+
+
+def pieces(course: Course) -> Ints:
+    """Number of the piece of each tick, shape (n,)."""
+    return np.arange(len(course.commands)) // round(PIECE / course.period)
