@@ -8,7 +8,7 @@ is changed only where the joints that move depend on it.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -26,9 +26,9 @@ ROBUST = 3.0
 """Residuals beyond so many standard deviations count in proportion, not by their square."""
 DRAWS = 400
 """Draws of a bootstrap."""
-_ROUNDS = 15
+_ROUNDS = 20
 """Most steps of a search."""
-_ENOUGH = 3e-4
+_ENOUGH = 1e-3
 """A search is done when a step improves the cost by less than this share."""
 _MOST_DAMPING = 1e3
 """A search is done, too, when no shorter step than that of this damping improves it."""
@@ -39,9 +39,9 @@ def _channels_of(robot: RobotSpec, course: Course) -> Floats:
     from antennate.errors import SimulationError
 
     try:
-        return channels(robot, simulated(robot, course))
+        return channels(robot, simulated(robot, course), course)
     except SimulationError:
-        return np.full_like(channels(robot, course), 10.0)
+        return np.full_like(channels(robot, course, course), 10.0)
 
 
 @dataclass
@@ -69,7 +69,7 @@ class Problem:
             np.array([NOISE[kind] for kind, _ in labels(self.robot, course)])
             for course in self.courses
         ]
-        self.measured = [channels(self.robot, course) for course in self.courses]
+        self.measured = [channels(self.robot, course, course) for course in self.courses]
         self.told = np.array([self._tells(course) for course in self.courses]).reshape(
             len(self.courses), len(self.chosen)
         )
@@ -144,13 +144,13 @@ class Solution:
 
     Attributes:
         x: Place of the best parameters, shape (P,).
-        cost: Robust cost there.
+        misfit: Mean square of the residuals there in units of the least noise.
         residuals: Residuals of all courses there, each (n, C).
         slopes: Change of them with each parameter, each (n, C, P).
     """
 
     x: Floats
-    cost: float
+    misfit: float
     residuals: list[Floats]
     slopes: list[Floats]
 
@@ -167,7 +167,10 @@ def solve(problem: Problem, begin: Floats, rounds: int = _ROUNDS) -> Solution:
     predicted = problem.predictions([(x, np.arange(len(problem.courses)))])[0]
     damping = 1e-3
     for number in range(rounds):
-        problem.noise = noises(problem, predicted)
+        before, problem.noise = problem.noise, noises(problem, predicted)
+        steady = all(
+            np.allclose(*pair, rtol=0.02) for pair in zip(before, problem.noise, strict=True)
+        )
         cost = problem.cost(x, predicted)
         residuals, slopes = problem.residuals(predicted), problem.slopes(x, predicted)
         bend, pull = _normal(problem, x, residuals, slopes)
@@ -178,14 +181,16 @@ def solve(problem: Problem, begin: Floats, rounds: int = _ROUNDS) -> Solution:
             gain = cost - problem.cost(x + step, new)
             damping = damping / 10.0 if gain > 0.0 else damping * 10.0
             if gain > 0.0:
-                x, predicted, small = x + step, new, gain < _ENOUGH * cost
+                x, predicted, small = x + step, new, steady and gain < _ENOUGH * cost
                 break
         problem.on_step(number + 1, rounds)
         if small or damping >= _MOST_DAMPING:
             break
     problem.noise = noises(problem, predicted)
+    ratios = zip(problem.noise, problem.least, strict=True)
+    misfit = float(np.mean([((noise / least) ** 2).mean() for noise, least in ratios]))
     slopes = problem.slopes(x, predicted)
-    return Solution(x, problem.cost(x, predicted), problem.residuals(predicted), slopes)
+    return Solution(x, misfit, problem.residuals(predicted), slopes)
 
 
 def _normal(
@@ -247,9 +252,7 @@ def covariances(
             w, r = weight[number == k].ravel(), residual[number == k].ravel()
             bends.append((rows * w[:, None]).T @ rows)
             pulls.append(rows.T @ (w * r))
-    owner = np.repeat(
-        np.arange(len(problem.courses)), [pieces(c)[-1] + 1 for c in problem.courses]
-    )
+    owner = np.repeat(np.arange(len(problem.courses)), [pieces(c)[-1] + 1 for c in problem.courses])
     bend, pull = np.array(bends), np.array(pulls)
     pinned = _pinned(problem, solution.x)
     draws = []
@@ -276,10 +279,3 @@ def _drawn(owner: Ints, rng: np.random.Generator) -> Floats:
         own = np.flatnonzero(owner == course)
         times += np.bincount(rng.choice(own, len(own)), minlength=len(owner))
     return times
-
-
-def best_start(problem: Problem, starts: Sequence[Floats], few: Callable[[], Problem]) -> Floats:
-    """The place of several from which a short search over few courses ends lowest."""
-    small = few()
-    found = [solve(small, start, rounds=5) for start in starts]
-    return min(found, key=lambda each: each.cost).x

@@ -55,7 +55,9 @@ SCALES: Mapping[str, Scale] = {
     "bend_gain": Scale("1/rad", 0.01, 10.0, 0.5, 0.03),
     "right_stiffness": Scale("1", 0.1, 10.0, 0.3, 0.03),
     "right_gain": Scale("1", 0.1, 10.0, 0.3, 0.03),
-    LEG: Scale("1", 0.03, 2.0, 0.5, 0.2),
+    LEG: Scale("1", 0.03, 2.0, 0.4, 0.2),
+    "leg_friction": Scale("1", 0.03, 2.0, 0.4, 0.2),
+    "friction_factors": Scale("1", 0.01, 2.0, 0.4, 0.2),
 }
 """Scales of the parameters by the last part of their name."""
 
@@ -105,12 +107,19 @@ def parameters(robot: RobotSpec, names: Iterable[tuple[str, int | None]]) -> lis
 def _value(robot: RobotSpec, path: str, place: int | None) -> float:
     if path == LEG:
         return robot.leg_frictions[place or 0]
+    if place is not None:
+        return _list(robot, path)[place]
     value: Any = robot
     for part in path.split("."):
         value = getattr(value, part)
-    if place is None:
-        return value
-    return value[place] if value else 0.0
+    return value
+
+
+def _list(robot: RobotSpec, path: str) -> tuple[float, ...]:
+    """A list of the robot in full, also where its file leaves it empty."""
+    if path == "yaw.backlash":
+        return robot.backlash
+    return robot.legs.friction_factors or (1.0,) * robot.leg_count
 
 
 def bounds(chosen: Sequence[Parameter]) -> tuple[Floats, Floats]:
@@ -130,8 +139,7 @@ def table(robot: RobotSpec, chosen: Sequence[Parameter], values: Sequence[float]
         elif each.place is None:
             flat[each.path] = value
         else:
-            count = len(robot.yaw_names)
-            flat.setdefault(each.path, list(robot.backlash[:count]))[each.place] = value
+            flat.setdefault(each.path, list(_list(robot, each.path)))[each.place] = value
     if any(each.path == LEG for each in chosen):
         flat["leg_friction"] = common = float(np.median(legs))
         flat["legs.friction_factors"] = [min(leg / common, 2.0) for leg in legs]

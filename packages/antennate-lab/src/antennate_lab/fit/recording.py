@@ -66,7 +66,9 @@ def read(path: Path, robot: RobotSpec) -> Recording:
         planned = [step.called for step in protocol_of(log).steps]
         ticks = {tick.number: tick for tick in log}
     found = {step.name: step for step in steps(path) if step.whole}
-    left_out = {name: "the log does not hold it to its end" for name in planned if name not in found}
+    left_out = {
+        name: "the log does not hold it to its end" for name in planned if name not in found
+    }
     courses = []
     for step in found.values():
         if step.place == "hand":

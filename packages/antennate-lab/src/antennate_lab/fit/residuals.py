@@ -23,6 +23,8 @@ PIECE = 0.5
 """Length of the pieces of a course over which a bootstrap draws [s]."""
 NOISE = {"position": POSITION_UNIT / 12**0.5, "gyro": 0.01, "counts": 3.0}
 """Least noise of a channel, by its kind: rounding [rad], [rad/s], [counts] (assumed)."""
+FEWEST_COUNTS = 30.0
+"""Readings that move by less tell nothing [counts] (assumed: ten times their noise)."""
 YAW_AXIS = 2
 
 
@@ -84,14 +86,39 @@ def labels(robot: RobotSpec, course: Course) -> list[tuple[str, str]]:
     return names
 
 
-def channels(robot: RobotSpec, course: Course) -> Floats:
-    """Channels of a course in the air, shape (n, C); gyroscope and readings about their median."""
-    kinds = {kind for kind, _ in labels(robot, course)}
-    parts = [course.positions[:, moving(course)]]
-    for kind, values in (("gyro", course.gyro[:, YAW_AXIS:]), ("counts", course.counts)):
-        if kind in kinds:
-            parts.append(values - np.median(values, axis=0))
+def channels(robot: RobotSpec, course: Course, measured: Course) -> Floats:
+    """Channels of a course in the air, shape (n, C); gyroscope and readings about their mean.
+
+    A flex sensor remembers how far it was bent before. So its readings count from the first large
+    bend of the step on, which makes it forget.
+
+    Args:
+        robot: The robot.
+        course: The course, measured or simulated.
+        measured: The measured one, which tells when readings begin to count.
+    """
+    kinds = {kind for kind, _ in labels(robot, measured)}
+    parts = [course.positions[:, moving(measured)]]
+    if "gyro" in kinds:
+        turning = course.gyro[:, YAW_AXIS:]
+        parts.append(turning - turning.mean(axis=0))
+    if "counts" in kinds:
+        parts.append(
+            np.array(
+                [_read(*pair) for pair in zip(course.counts.T, measured.counts.T, strict=True)]
+            ).T
+        )
     return np.nan_to_num(np.concatenate(parts, axis=1))
+
+
+def _read(counts: Floats, measured: Floats) -> Floats:
+    """Readings of one antenna about their mean from the first large bend on, 0 before, (n,)."""
+    away = abs(measured - np.median(measured))
+    begin = int(np.argmax(away > 0.5 * away.max()))
+    heard = np.arange(len(counts)) >= begin
+    if not away.max() > FEWEST_COUNTS:
+        return np.zeros(len(counts))
+    return np.where(heard, counts - counts[heard].mean(), 0.0)
 
 
 def pieces(course: Course) -> Ints:

@@ -1,0 +1,78 @@
+"""Everything that decides the outcome of `antennate fit`."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+
+from pydantic import Field
+
+from antennate.errors import ConfigError, in_one_line
+from antennate.files import decoded, read_limited
+from antennate.params.base import LARGEST_FILE, Params, from_values, number, with_bases
+from antennate.robots.spec import ROBOTS, RobotSpec
+
+
+class FitConfig(Params):
+    """Everything that decides the outcome of `antennate fit`."""
+
+    log: tuple[str, ...] = Field(
+        (),
+        json_schema_extra={
+            "unit": "1",
+            "source": "assumed: has to be named",
+            "metavar": "LOG",
+            "positional": True,
+        },
+    )
+    """Logs of `drive --protocol`, of one robot."""
+    robot: str = number(
+        ROBOTS[0], "1", "assumed: the default robot", metavar="NAME|FILE", examples=list(ROBOTS)
+    )
+    """Robot that was driven: a name, or a TOML file of a robot, which may be a `robot.toml`."""
+    leave_out: tuple[str, ...] = number(
+        (), "1", "assumed: the walks at the middle one of the frequencies", metavar="STEP"
+    )
+    """Steps that are not fitted and judge the fit."""
+    robots: int = number(
+        120, "1", "measured: twice as many tell frictions 10 % better", ge=20, le=5000
+    )
+    """Robots of each of two rounds that walk in the simulation."""
+    seed: int = number(0, "1", "assumed: any", ge=0)
+    """Seed of draws."""
+
+    @property
+    def described(self) -> RobotSpec:
+        """The robot.
+
+        Raises:
+            ConfigError: There is none of that name, or the file cannot be used.
+        """
+        if self.robot in ROBOTS:
+            return RobotSpec.named(self.robot)
+        table = tomllib.loads(self.text)
+        if "robot" not in table:
+            return RobotSpec.named(self.robot)
+        own = with_bases({"robot": table["robot"]}, _Holder, Path(self.robot).parent)
+        return from_values(_Holder, own).robot
+
+    @property
+    def text(self) -> str:
+        """Text of the robot's file; that of a name says which robot it is."""
+        if self.robot in ROBOTS:
+            return ""
+        path = Path(self.robot)
+        if path.suffix != ".toml":
+            RobotSpec.named(self.robot)  # says what was expected
+        text = decoded(path, read_limited(path, LARGEST_FILE, ConfigError), ConfigError)
+        try:
+            tomllib.loads(text)
+        except tomllib.TOMLDecodeError as error:
+            raise ConfigError(f"{path}: expected TOML, found: {in_one_line(error)}") from None
+        return text
+
+
+class _Holder(Params):
+    """The table of a robot in its file."""
+
+    robot: RobotSpec = RobotSpec()

@@ -1,0 +1,131 @@
+"""What is known of each parameter in the end: value, interval, and whether the logs tell it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from antennate.robots.spec import RobotSpec
+from antennate.types import Floats
+from antennate_lab.fit.least_squares import Problem, Solution
+from antennate_lab.fit.parameters import Parameter, bounds, parameters
+from antennate_lab.fit.regression import Known, Told
+from antennate_lab.fit.result import Correlation, ParameterRow
+
+LEVEL = 1.645
+"""Half the width of a 90 % interval of a normal distribution [standard deviations]."""
+TOLD = 0.5
+"""A parameter is told if its interval is narrower than this share of what was known before."""
+SHORTEST = 0.002
+"""Delays up to the timestep of the physics are alike [s]."""
+_DRAWS = 4000
+_MOST = 8
+_LEAST = 0.5
+"""Correlations that are listed: so many, of this size at least."""
+_RECORD = {
+    "servos": "sweep a joint with this servo in the air (place hanging)",
+    "yaw": "sweep this yaw joint in the air (place hanging), with an inertial sensor",
+    "legs.gain_factor": "sweep legs and yaw joints in the air (place hanging)",
+    "legs": "walk on the floor: forward, turns and reverse at several frequencies",
+    "leg_friction": "walk on the floor: forward, turns and reverse at several frequencies",
+    "antenna": "sweep antenna bases and yaw joints in the air (place hanging)",
+    "antennae": "sweep antenna bases and yaw joints in the air (place hanging)",
+}
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """One parameter.
+
+    Attributes:
+        parameter: Which one.
+        value: Its value; as before where it is not told.
+        interval: Ends of the 90 % interval.
+        told: Whether the logs tell it.
+        by: What tells it, `air` or `floor`.
+        errors: Draws of its error on the scale of the search, shape (draws,).
+    """
+
+    parameter: Parameter
+    value: float
+    interval: tuple[float, float]
+    told: bool
+    by: str
+    errors: Floats
+
+    def row(self) -> ParameterRow:
+        """The row of trials.csv."""
+        path = self.parameter.path
+        record = _RECORD.get(path) or _RECORD[path.partition(".")[0]]
+        return ParameterRow(
+            name=self.parameter.name,
+            unit=self.parameter.scale.unit,
+            before=self.parameter.start,
+            value=self.value,
+            interval_90=self.interval,
+            told=self.told,
+            by=self.by if self.told else "",
+            record="" if self.told else record,
+        )
+
+
+def of_air(
+    problem: Problem, solution: Solution, covariance: Floats, draws: Floats
+) -> list[Estimate]:
+    """Estimates by least squares; the wider one of the Hessian's and the bootstrap's interval."""
+    sd = np.maximum(np.sqrt(np.diag(covariance)), draws.std(axis=0))
+    low, high = bounds(problem.chosen)
+    found = []
+    for p, each in enumerate(problem.chosen):
+        told = bool(problem.told[:, p].any() and sd[p] < TOLD * each.scale.spread)
+        middle = solution.x[p] if told else problem.start[p]
+        ends = np.clip(middle + LEVEL * np.array([-1.0, 1.0]) * sd[p], low[p], high[p])
+        interval = (each.value(ends[0]), each.value(ends[1]))
+        if each.path.endswith("delay") and interval[0] <= SHORTEST:
+            interval = (0.0, max(interval[1], SHORTEST))
+        value = each.value(solution.x[p]) if told else each.start
+        errors = draws[:, p] * sd[p] / max(draws[:, p].std(), 1e-12)
+        found.append(Estimate(each, value, interval, told, "air", errors))
+    return found
+
+
+def of_legs(robot: RobotSpec, legs: Told, prior: Known, rng: np.random.Generator) -> list[Estimate]:
+    """Estimates of the common friction of the legs, their median, and of each over it."""
+    count = robot.leg_count
+    names = [("leg_friction", None), *(("legs.friction_factors", i) for i in range(count))]
+    chosen = parameters(robot, names)
+    covariance = legs.correlation * np.outer(legs.sd, legs.sd)
+    drawn = rng.multivariate_normal(legs.mean, covariance, _DRAWS, method="eigh")
+    before = _common(prior.draw(_DRAWS, rng))
+    after = _common(drawn)
+    found = []
+    for p, each in enumerate(chosen):
+        ends = np.quantile(after[:, p], [0.05, 0.95])
+        told = bool(np.ptp(ends) < TOLD * np.ptp(np.quantile(before[:, p], [0.05, 0.95])))
+        value = float(np.exp(np.median(after[:, p]))) if told else each.start
+        interval = (float(np.exp(ends[0])), float(np.exp(ends[1])))
+        errors = after[:_DRAWS, p] - np.median(after[:, p])
+        found.append(Estimate(each, value, interval, told, "floor", errors))
+    return found
+
+
+def _common(logs: Floats) -> Floats:
+    """Median and what each is over it, of logarithms (n, legs), shape (n, 1 + legs)."""
+    middle = np.median(logs, axis=1, keepdims=True)
+    return np.concatenate([middle, logs - middle], axis=1)
+
+
+def correlations(found: Sequence[Estimate]) -> list[Correlation]:
+    """Pairs of told parameters whose errors go together most."""
+    pairs = []
+    for at, one in enumerate(found):
+        for other in found[at + 1 :]:
+            if one.told and other.told and one.by == other.by:
+                r = float(np.corrcoef(one.errors, other.errors)[0, 1])
+                pairs.append(
+                    Correlation(one=one.parameter.name, other=other.parameter.name, correlation=r)
+                )
+    large = [pair for pair in pairs if abs(pair.correlation) >= _LEAST]
+    return sorted(large, key=lambda pair: -abs(pair.correlation))[:_MOST]

@@ -1,0 +1,198 @@
+"""Steps on the floor: parameters by regression on what simulated robots feel there.
+
+Feet stick and slip, so that two walks of one robot part, and a slope by one small change is noise.
+Instead robots are drawn, each walks all steps once, and each parameter is regressed on what was
+felt, linearly with a ridge (approximate Bayesian computation with regression adjustment: Beaumont,
+Zhang and Balding, Genetics 162, 2002). What the regression misses of robots that it did not see is
+the standard deviation, so that a parameter that the steps do not tell keeps what was known before.
+A second round draws about what the first has found.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from antennate.errors import SimulationError
+from antennate.robots.spec import RobotSpec
+from antennate.studies.pool import Workers, gather
+from antennate.studies.trials import OnStep
+from antennate.types import Floats
+from antennate_lab.fit.parameters import Parameter, bounds
+from antennate_lab.fit.residuals import NOISE, moving
+from antennate_lab.fit.simulated import Course, simulated
+
+BINS = 10
+"""Parts of a cycle over which what is felt is a mean."""
+WIDER = 2.0
+"""A second round draws from a distribution so many times as wide as what the first has found."""
+_RIDGES = 10.0 ** np.arange(-4.0, 3.0, 0.5)
+
+
+@dataclass(frozen=True)
+class Known:
+    """Normal distributions of parameters on the scale of the search.
+
+    Attributes:
+        mean: Of each, shape (P,).
+        own: Standard deviation of what each has of its own, shape (P,).
+        shared: Standard deviation of what all have in common.
+    """
+
+    mean: Floats
+    own: Floats
+    shared: float = 0.0
+
+    @property
+    def sd(self) -> Floats:
+        """Standard deviation of each, shape (P,)."""
+        return np.hypot(self.own, self.shared)
+
+    def draw(self, count: int, rng: np.random.Generator) -> Floats:
+        """Places of the search, shape (count, P)."""
+        own = self.own * rng.standard_normal((count, len(self.mean)))
+        return self.mean + own + self.shared * rng.standard_normal((count, 1))
+
+
+def felt(robot: RobotSpec, course: Course) -> Floats:
+    """Means over parts of a cycle of how far joints lag and of the head's turning, shape (F,)."""
+    lag = (course.positions - course.commands)[:, moving(course)]
+    values = np.concatenate([lag / NOISE["position"], course.gyro / NOISE["gyro"]], axis=1)
+    width = max(1, round(course.cycle / course.period / BINS))
+    count = len(values) // width
+    return np.nan_to_num(values[: count * width].reshape(count, width, -1).mean(axis=1).ravel())
+
+
+def _felt_of(robot: RobotSpec, courses: Sequence[Course]) -> Floats:
+    """What a simulated robot feels in all courses; NaN where the simulation fails."""
+    parts = []
+    for course in courses:
+        try:
+            parts.append(felt(robot, simulated(robot, course)))
+        except SimulationError:
+            parts.append(np.full_like(felt(robot, course), np.nan))
+    return np.concatenate(parts)
+
+
+def drawn(
+    chosen: Sequence[Parameter], known: Known, count: int, rng: np.random.Generator
+) -> Floats:
+    """Places of the search, shape (count, P)."""
+    low, high = bounds(chosen)
+    return np.clip(known.draw(count, rng), low, high)
+
+
+def walked(
+    robots: Sequence[RobotSpec], courses: Sequence[Course], workers: Workers, on_step: OnStep
+) -> Floats:
+    """What robots feel in all courses, shape (robots, F)."""
+    return np.array(gather(_felt_of, [(robot, courses) for robot in robots], workers, on_step))
+
+
+@dataclass(frozen=True)
+class Told:
+    """What steps tell of the parameters, on the scale of the search.
+
+    Attributes:
+        mean, sd: Of each, shape (P,).
+        correlation: Of what the regression misses, shape (P, P).
+    """
+
+    mean: Floats
+    sd: Floats
+    correlation: Floats
+
+
+def regressed(
+    places: Floats, features: Floats, measured: Floats, proposal: Known, prior: Known
+) -> Told:
+    """Parameters of a robot from what it felt.
+
+    Args:
+        places: Parameters of the robots that were drawn, shape (N, P).
+        features: What they felt, shape (N, F).
+        measured: What the robot felt, shape (F,).
+        proposal: Distribution that they were drawn from.
+        prior: What was known before.
+    """
+    sound = np.isfinite(features).all(axis=1)
+    places, features = places[sound], features[sound]
+    scale = np.hypot(features.std(axis=0), 1.0)
+    centre = features.mean(axis=0)
+    rows, new = (features - centre) / scale, (measured - centre) / scale
+    middle = places.mean(axis=0)
+    left, size, _ = np.linalg.svd(rows @ rows.T / rows.shape[1])
+    aim = left.T @ (places - middle)
+    own = left.T @ (rows @ new / rows.shape[1])
+    found, missed = np.empty(places.shape[1]), np.empty_like(places)
+    for p in range(places.shape[1]):
+        fits = []
+        for ridge in _RIDGES:
+            shrink = size / (size + ridge)
+            hat = np.einsum("ij,j,ij->i", left, shrink, left)
+            away = places[:, p] - middle[p] - left @ (shrink * aim[:, p])
+            away = away / np.maximum(1.0 - hat, 1e-3)
+            fits.append((float((away**2).mean()), ridge, away))
+        _, ridge, missed[:, p] = min(fits, key=lambda fit: fit[0])
+        found[p] = middle[p] + own @ (aim[:, p] / (size + ridge))
+    sd = missed.std(axis=0)
+    return _corrected(Told(found, sd, np.corrcoef(missed.T)), proposal, prior)
+
+
+def _corrected(told: Told, proposal: Known, prior: Known) -> Told:
+    """What is known with the prior in place of the distribution that robots were drawn from."""
+    own, drawn_from, before = (sd**-2.0 for sd in (told.sd, proposal.sd, prior.sd))
+    precision = np.maximum(own - drawn_from, 0.0) + before
+    pull = np.maximum(own - drawn_from, 0.0)
+    # what the data alone say: the regression without the distribution that it was drawn from
+    alone = np.where(
+        pull > 0.0,
+        (own * told.mean - drawn_from * proposal.mean) / np.where(pull > 0.0, pull, 1.0),
+        prior.mean,
+    )
+    mean = (pull * alone + before * prior.mean) / precision
+    return Told(mean, precision**-0.5, told.correlation)
+
+
+def search(
+    made: Callable[[Floats], RobotSpec],
+    chosen: Sequence[Parameter],
+    courses: Sequence[Course],
+    prior: Known,
+    count: int,
+    workers: Workers,
+    rng: np.random.Generator,
+    on_step: OnStep,
+) -> Told:
+    """What courses on the floor tell, in two rounds of `count` robots each.
+
+    Args:
+        made: Robot of a place of the search.
+        chosen: The parameters.
+        courses: What was measured.
+        prior: What was known before.
+        count: Robots of a round.
+        workers: Where they walk.
+        rng: What they are drawn with.
+        on_step: Told of each robot, of both rounds.
+    """
+    measured = np.concatenate([felt(made(prior.mean), course) for course in courses])
+    proposal = prior
+    for number in range(2):
+        places = drawn(chosen, proposal, count, rng)
+        features = walked(
+            [made(place) for place in places],
+            courses,
+            workers,
+            lambda done, _, number=number: on_step(number * count + done, 2 * count),
+        )
+        told = regressed(places, features, measured, proposal, prior)
+        proposal = Known(told.mean, np.minimum(WIDER * told.sd, prior.sd))
+    return told
+
+
+def is_walk(course: Course) -> bool:
+    """Whether a course is a walk on the floor."""
+    return not course.hanging and course.cycle > 0.0

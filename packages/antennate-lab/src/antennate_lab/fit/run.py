@@ -1,0 +1,241 @@
+"""A fit from logs to a robot: first steps in the air, then walks, then both robots on all steps."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from antennate.errors import BadInputError, SimulationError
+from antennate.robots.spec import RobotSpec
+from antennate.studies.pool import Workers, gather, workers_from
+from antennate.studies.trials import OnStep, no_step
+from antennate.types import Floats
+from antennate_lab.fit import least_squares, measures, recording, regression
+from antennate_lab.fit.config import FitConfig
+from antennate_lab.fit.estimates import Estimate, of_air, of_legs
+from antennate_lab.fit.least_squares import Problem
+from antennate_lab.fit.parameters import LEG, Parameter, changed, parameters
+from antennate_lab.fit.recording import Recording
+from antennate_lab.fit.regression import Known, is_walk
+from antennate_lab.fit.residuals import merged, moving
+from antennate_lab.fit.simulated import Course, simulated
+
+_GAINS = (0.5, 1.0, 2.0)
+"""Gains of servos with which a search begins, over those of the robot's file."""
+_DELAY = 0.005
+"""Delay with which a search begins [s]."""
+_LEVEL = 0.4
+"""Standard deviation of the logarithm of the friction that all legs share, before."""
+_AIR, _ALL = 400, 1000
+"""Steps of the progress line when the air is done, and at the end."""
+_ODD = 1.3
+"""A joint whose lag differs from those of its group by more than this factor is named."""
+
+
+@dataclass(frozen=True)
+class FitOutcome:
+    """What a fit has found.
+
+    Attributes:
+        before: The robot of the file.
+        after: The fitted robot.
+        recordings: Logs as they were read.
+        courses: All courses of all logs, with the name of their log.
+        held: Names of the steps that were not fitted.
+        made: The courses as simulated with the robot before and the fitted one.
+        found: What is known of each parameter.
+        warnings: What is wrong.
+    """
+
+    config: FitConfig
+    before: RobotSpec
+    after: RobotSpec
+    recordings: list[Recording]
+    courses: list[tuple[str, Course]]
+    held: frozenset[str]
+    made: list[tuple[Course, Course]]
+    found: list[Estimate]
+    warnings: list[str]
+
+
+def run(config: FitConfig, workers: int | Workers, on_step: OnStep = no_step) -> FitOutcome:
+    """Fit a robot to logs.
+
+    Args:
+        config: Logs and robot.
+        workers: Where simulations run.
+        on_step: Told of how many of how many parts are done.
+
+    Raises:
+        BadInputError: A log cannot be of that robot, or holds nothing to compare.
+    """
+    if not config.log:
+        raise BadInputError("log: expected logs of `drive --protocol`, found none")
+    robot = config.described
+    recordings = [recording.read(Path(name), robot) for name in config.log]
+    courses = [(each.name, course) for each in recordings for course in each.courses]
+    held = _left_out(config, [course for _, course in courses])
+    seen = [course for _, course in courses if course.name not in held]
+    rng = np.random.default_rng(config.seed)
+    with workers_from(workers).stay() as pool:
+        air = merged(robot, [course for course in seen if course.hanging])
+        found = _in_air(robot, air, pool, rng, on_step) if air else []
+        walks = [course for course in seen if is_walk(course)]
+        if walks:
+            found += _on_floor(config, with_told(robot, found), walks, pool, rng, on_step)
+        after = with_told(robot, found)
+        tasks = [(each, course) for _, course in courses for each in (robot, after)]
+        made = gather(_simulated, tasks, pool, no_step)
+    pairs = list(zip(made[::2], made[1::2], strict=True))
+    warnings = [f"{each.name}: {text}" for each in recordings for text in each.warnings]
+    warnings += _odd_joints(robot, courses)
+    on_step(_ALL, _ALL)
+    return FitOutcome(config, robot, after, recordings, courses, held, pairs, found, warnings)
+
+
+def with_told(robot: RobotSpec, found: Sequence[Estimate]) -> RobotSpec:
+    """The robot with all numbers that are told."""
+    told = [each for each in found if each.told]
+    return changed(robot, [each.parameter for each in told], [each.value for each in told])
+
+
+def _simulated(robot: RobotSpec, course: Course) -> Course:
+    """A course as simulated; where that fails, joints that follow their commands."""
+    try:
+        return simulated(robot, course)
+    except SimulationError:
+        return course
+
+
+def _left_out(config: FitConfig, courses: Sequence[Course]) -> frozenset[str]:
+    """Steps that judge the fit: those that were named, else walks at the middle frequency."""
+    names = {course.name for course in courses}
+    if unknown := [name for name in config.leave_out if name not in names]:
+        raise BadInputError(
+            f"leave_out: expected steps of the logs, {', '.join(sorted(names))}, found {unknown[0]}"
+        )
+    cycles = sorted({course.cycle for course in courses if is_walk(course)})
+    if config.leave_out or len(cycles) < 3:
+        return frozenset(config.leave_out)
+    middle = cycles[len(cycles) // 2]
+    return frozenset(course.name for course in courses if course.cycle == middle)
+
+
+def _in_air(
+    robot: RobotSpec,
+    air: list[Course],
+    pool: Workers,
+    rng: np.random.Generator,
+    on_step: OnStep,
+) -> list[Estimate]:
+    """Servos, backlash and antennae from steps in the air."""
+    chosen = parameters(robot, _names(robot))
+
+    def told(done: int, of: int) -> None:
+        on_step(_AIR // 5 + round(0.8 * _AIR * done / of), _ALL)
+
+    begin = _start(robot, chosen, air, pool)
+    problem = Problem(robot, air, chosen, pool, told)
+    solution = least_squares.solve(problem, begin)
+    covariance, draws = least_squares.covariances(problem, solution, rng)
+    on_step(_AIR, _ALL)
+    return of_air(problem, solution, covariance, draws)
+
+
+def _names(robot: RobotSpec) -> list[tuple[str, int | None]]:
+    """Parameters that steps in the air may tell."""
+    names: list[tuple[str, int | None]] = []
+    rubbing = {robot.yaw.servo, robot.legs.servo}
+    for servo in dict.fromkeys(robot.servo_names):
+        own = ["gain_divisor", "delay", "armature"]
+        own += ["friction", "load_friction"] if servo in rubbing else []
+        names += [(f"servos.{servo}.{name}", None) for name in own]
+    if robot.legs.servo == robot.yaw.servo:
+        names.append(("legs.gain_factor", None))
+    names += [("yaw.backlash", place) for place in range(robot.yaw_count)]
+    if robot.antenna_count:
+        names += [
+            ("antenna.three_coil_stiffness_n_mm_per_deg", None),
+            ("antenna.damping_time", None),
+            ("antennae.right_stiffness", None),
+            ("antennae.right_gain", None),
+        ]
+        if robot.antenna.sensor.kind == "flex":
+            names.append(("antenna.sensor.bend_gain", None))
+    return names
+
+
+def _start(
+    robot: RobotSpec, chosen: Sequence[Parameter], air: list[Course], pool: Workers
+) -> Floats:
+    """Place at which the search begins: the best of several, by the lightest joints alone."""
+    light = [c for c in air if len(moving(c)) > 1] or air[:1]
+    few = [each for each in chosen if each.path.startswith("servos.")]
+    found = []
+    for gain in _GAINS:
+        problem = Problem(robot, light, few, pool)
+        begin = problem.start.copy()
+        for place, each in enumerate(few):
+            if each.path.endswith("gain_divisor"):
+                begin[place] -= np.log(gain)
+            if each.path.endswith("delay"):
+                begin[place] = max(begin[place], _DELAY)
+        found.append(least_squares.solve(problem, begin, rounds=4))
+    best = min(found, key=lambda each: each.misfit)
+    known = dict(zip([each.name for each in few], best.x.tolist(), strict=True))
+    return np.array([known.get(each.name, each.searched(each.start)) for each in chosen])
+
+
+def _on_floor(
+    config: FitConfig,
+    robot: RobotSpec,
+    walks: list[Course],
+    pool: Workers,
+    rng: np.random.Generator,
+    on_step: OnStep,
+) -> list[Estimate]:
+    """Friction of each leg from walks of robots whose servos are as the air has told."""
+    chosen = parameters(robot, [(LEG, place) for place in range(robot.leg_count)])
+    own = np.array([each.scale.spread for each in chosen])
+    start = np.array([each.searched(each.start) for each in chosen])
+    prior = Known(start, own, _LEVEL)
+
+    def made(x: Floats) -> RobotSpec:
+        values = [each.value(at) for each, at in zip(chosen, x.tolist(), strict=True)]
+        return changed(robot, chosen, values)
+
+    def told(done: int, of: int) -> None:
+        on_step(_AIR + round((_ALL - _AIR - 20) * done / of), _ALL)
+
+    legs = regression.search(made, chosen, walks, prior, config.robots, pool, rng, told)
+    return of_legs(robot, legs, prior, rng)
+
+
+def _odd_joints(robot: RobotSpec, courses: Sequence[tuple[str, Course]]) -> list[str]:
+    """Joints that follow unlike the others of their group, alone in the air."""
+    found: dict[str, dict[str, float]] = {}
+    for _, course in courses:
+        joints = moving(course)
+        if course.hanging and len(joints) == 1:
+            group = next(g for g, _, _ in robot.groups if _holds(robot, g, int(joints[0])))
+            lag = float(measures.lags(course)[0])
+            found.setdefault(group, {})[robot.joint_names[int(joints[0])]] = lag
+    told = []
+    for group, lags in found.items():
+        usual = float(np.median(list(lags.values())))
+        for name, lag in lags.items():
+            alike = group == "legs" or group == "antennae"
+            if alike and len(lags) > 1 and not 1.0 / _ODD < lag / usual < _ODD:
+                told.append(
+                    f"{name} follows {1e3 * lag:.0f} ms late, other {group} {1e3 * usual:.0f} ms: "
+                    "a servo of another model, or a damaged one?"
+                )
+    return told
+
+
+def _holds(robot: RobotSpec, group: str, joint: int) -> bool:
+    places = robot.places(group)  # type: ignore[arg-type]
+    return places.start <= joint < places.stop
