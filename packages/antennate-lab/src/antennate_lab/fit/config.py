@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tomllib
+from importlib.resources import files
 from pathlib import Path
 
 from pydantic import Field
@@ -58,9 +59,9 @@ class FitConfig(Params):
 
     @property
     def text(self) -> str:
-        """Text of the robot's file; that of a name says which robot it is."""
+        """Text of the robot's file."""
         if self.robot in ROBOTS:
-            return ""
+            return (files("antennate.robots") / f"{self.robot}.toml").read_text(encoding="utf-8")
         path = Path(self.robot)
         if path.suffix != ".toml":
             RobotSpec.named(self.robot)  # says what was expected

@@ -30,6 +30,8 @@ _ROUNDS = 20
 """Most steps of a search."""
 _ENOUGH = 1e-3
 """A search is done when a step improves the cost by less than this share."""
+_STEADY = 0.03
+"""And when the noise changes by less than this share."""
 _MOST_DAMPING = 1e3
 """A search is done, too, when no shorter step than that of this damping improves it."""
 
@@ -66,7 +68,7 @@ class Problem:
     def __post_init__(self) -> None:
         """Begin with the least noise of each channel."""
         self.noise = self.least = [
-            np.array([NOISE[kind] for kind, _ in labels(self.robot, course)])
+            np.array([[NOISE[kind] for kind, _ in labels(self.robot, course)]])
             for course in self.courses
         ]
         self.measured = [channels(self.robot, course, course) for course in self.courses]
@@ -160,35 +162,38 @@ def solve(problem: Problem, begin: Floats, rounds: int = _ROUNDS) -> Solution:
 
     Levenberg and Marquardt's steps, each within the bounds by SciPy's `lsq_linear`. The noise of a
     channel is at least what its residuals are at present, so that a start that is far off counts
-    all of them, and the last rounds the outliers less.
+    all of them. When that has settled, each piece of a course has its own: what a step before has
+    left swinging counts less.
     """
     low, high = bounds(problem.chosen)
     x = np.clip(begin, low, high)
-    predicted = problem.predictions([(x, np.arange(len(problem.courses)))])[0]
-    damping = 1e-3
+    every = np.arange(len(problem.courses))
+    predicted = problem.predictions([(x, every)])[0]
+    damping, by_piece = 1e-3, False
     for number in range(rounds):
-        before, problem.noise = problem.noise, noises(problem, predicted)
-        steady = all(
-            np.allclose(*pair, rtol=0.02) for pair in zip(before, problem.noise, strict=True)
-        )
+        before, problem.noise = problem.noise, noises(problem, predicted, by_piece)
+        pairs = zip(before, problem.noise, strict=True)
+        steady = all(np.allclose(*pair, rtol=_STEADY) for pair in pairs)
         cost = problem.cost(x, predicted)
         residuals, slopes = problem.residuals(predicted), problem.slopes(x, predicted)
         bend, pull = _normal(problem, x, residuals, slopes)
-        small = False
+        gain = 0.0
         while damping < _MOST_DAMPING:
             step = _bounded(bend, pull, damping, low - x, high - x)
-            new = problem.predictions([(x + step, np.arange(len(problem.courses)))])[0]
+            new = problem.predictions([(x + step, every)])[0]
             gain = cost - problem.cost(x + step, new)
             damping = damping / 10.0 if gain > 0.0 else damping * 10.0
             if gain > 0.0:
-                x, predicted, small = x + step, new, steady and gain < _ENOUGH * cost
+                x, predicted = x + step, new
                 break
         problem.on_step(number + 1, rounds)
-        if small or damping >= _MOST_DAMPING:
-            break
-    problem.noise = noises(problem, predicted)
-    ratios = zip(problem.noise, problem.least, strict=True)
-    misfit = float(np.mean([((noise / least) ** 2).mean() for noise, least in ratios]))
+        if gain <= 0.0 or (steady and gain < _ENOUGH * cost):
+            if by_piece:
+                break
+            by_piece, damping = True, 1e-3
+    problem.noise = noises(problem, predicted, by_piece=True)
+    whole = zip(noises(problem, predicted), problem.least, strict=True)
+    misfit = float(np.mean([((noise / least) ** 2).mean() for noise, least in whole]))
     slopes = problem.slopes(x, predicted)
     return Solution(x, misfit, problem.residuals(predicted), slopes)
 
@@ -219,13 +224,27 @@ def _bounded(bend: Floats, pull: Floats, damping: float, low: Floats, high: Floa
     return np.asarray(lsq_linear(root, -np.linalg.solve(root.T, pull), ends, method="bvls").x)
 
 
-def noises(problem: Problem, predicted: Sequence[Floats]) -> list[Floats]:
-    """Noise of each channel, at least the least one, from the residuals of predictions."""
-    parts = zip(problem.least, predicted, problem.measured, strict=True)
-    return [
-        np.maximum(least, np.sqrt(((simulated - measured) ** 2).mean(axis=0)))
-        for least, simulated, measured in parts
-    ]
+def noises(problem: Problem, predicted: Sequence[Floats], by_piece: bool = False) -> list[Floats]:
+    """Noise of each channel, at least the least one, from the residuals of predictions.
+
+    Args:
+        problem: What was measured.
+        predicted: What was simulated.
+        by_piece: Whether each piece of a course has its own; else a course has one.
+
+    Returns:
+        For each course, shape (1, C), or (n, C).
+    """
+    found = []
+    for course, least, simulated, measured in zip(
+        problem.courses, problem.least, predicted, problem.measured, strict=True
+    ):
+        square = (simulated - measured) ** 2
+        number = pieces(course) if by_piece else np.zeros(len(square), np.int64)
+        means = [square[number == k].mean(axis=0) for k in range(number[-1] + 1)]
+        rows = np.maximum(least, np.sqrt(means))
+        found.append(rows[number] if by_piece else rows)
+    return found
 
 
 def covariances(

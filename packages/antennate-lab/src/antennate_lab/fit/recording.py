@@ -66,9 +66,8 @@ def read(path: Path, robot: RobotSpec) -> Recording:
         planned = [step.called for step in protocol_of(log).steps]
         ticks = {tick.number: tick for tick in log}
     found = {step.name: step for step in steps(path) if step.whole}
-    left_out = {
-        name: "the log does not hold it to its end" for name in planned if name not in found
-    }
+    missing = [name for name in planned if name not in found]
+    left_out = dict.fromkeys(missing, "the log does not hold it to its end")
     courses = []
     for step in found.values():
         if step.place == "hand":
@@ -85,7 +84,6 @@ def read(path: Path, robot: RobotSpec) -> Recording:
             f"{path}: expected whole steps with measured positions, found none of {len(planned)}"
         )
     warnings = _drift(list(ticks.values()), period)
-    missing = [name for name in planned if name not in found]
     if missing:
         warnings.append(
             f"{len(missing)} of {len(planned)} steps of the protocol are missing, from "

@@ -103,11 +103,8 @@ def channels(robot: RobotSpec, course: Course, measured: Course) -> Floats:
         turning = course.gyro[:, YAW_AXIS:]
         parts.append(turning - turning.mean(axis=0))
     if "counts" in kinds:
-        parts.append(
-            np.array(
-                [_read(*pair) for pair in zip(course.counts.T, measured.counts.T, strict=True)]
-            ).T
-        )
+        pairs = zip(course.counts.T, measured.counts.T, strict=True)
+        parts.append(np.array([_read(*pair) for pair in pairs]).T)
     return np.nan_to_num(np.concatenate(parts, axis=1))
 
 

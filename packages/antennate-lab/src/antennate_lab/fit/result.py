@@ -100,8 +100,6 @@ class FitResult:
     noise: dict[str, float]
     """Noise of the sensors at rest: `counts` of readings, `gyro` [rad/s]; and `gyro_zero`, the zero
     of the gyroscope about the vertical axis [rad/s]."""
-    table: dict[str, object]
-    """What was changed in the robot's file, in tables as in that."""
     warnings: list[str]
     """What is wrong with the logs, or with the robot."""
     simulate: str

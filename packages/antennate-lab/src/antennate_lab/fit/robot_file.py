@@ -2,66 +2,68 @@
 
 from __future__ import annotations
 
+import tomllib
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import tomlkit
-from tomlkit.items import Table
 
+from antennate.hardware.setup.robot_toml import Key, Value, edited
 from antennate_lab.fit.estimates import Estimate
-from antennate_lab.fit.parameters import nested
+
+_DIGITS = 5
+"""Digits of a value."""
 
 
-def written(text: str, base: str, found: Sequence[Estimate], logs: Sequence[str]) -> str:
+def values_of(found: Sequence[Estimate]) -> dict[str, float | list[float]]:
+    """What a robot's file says of what is told, by path; a list with all of its entries."""
+    values: dict[str, float | list[float]] = {}
+    lists = {each.parameter.path for each in found if each.told}
+    for each in found:
+        path, value = each.parameter.path, float(f"{each.value:.{_DIGITS}g}")
+        if path not in lists:
+            continue
+        if each.parameter.place is None:
+            values[path] = value
+        else:
+            entries = values.setdefault(path, [])
+            assert isinstance(entries, list)
+            entries.append(value)
+    return values
+
+
+def written(text: str, found: Sequence[Estimate], logs: Sequence[str]) -> str:
     """Text of the file: tables and comments of the one before stay.
 
     Args:
-        text: The file before; empty for a robot that is known by name.
-        base: Name of the robot that the text is empty for.
+        text: The file before, of a robot or a `robot.toml` with a table of that name.
         found: What was found.
         logs: Names of the logs.
     """
     document = tomlkit.parse(text)
-    robot: Any = document["robot"] if "robot" in document else document
-    source = f"measured: fit of {', '.join(logs)}"
-    told = [each for each in found if each.told]
-    _set(robot, nested(told_values(found)), source)
-    robot["fitted"] = _fitted(told, source)
-    lines = tomlkit.dumps(document)
-    named = f'# The robot {base}, fitted: give it as `--robot`.\n' if not text else ""
-    return named + lines
-
-
-def told_values(found: Sequence[Estimate]) -> Mapping[str, Any]:
-    """Values by their path; of a list all of its entries, those that are not told as before."""
-    values: dict[str, Any] = {}
+    within: tuple[str, ...] = ("robot",) if "robot" in document else ()
+    robot = document.get("robot", document)
+    if isinstance(robot, str):
+        document["robot"] = {"base": robot}
+    elif isinstance(robot, Mapping):
+        robot.pop("fitted", None)  # type: ignore[attr-defined]
+    changes: dict[Key, Value] = {}
+    for path, value in values_of(found).items():
+        changes[(*within, *path.split("."))] = value
+    blocks = [edited(tomlkit.dumps(document), changes).rstrip() + "\n"]
     for each in found:
-        path, place = each.parameter.path, each.parameter.place
-        rounded = float(f"{each.value:.6g}")
-        if place is None:
-            if each.told:
-                values[path] = rounded
-        else:
-            values.setdefault(path, []).append(rounded)
-    lists = {each.parameter.path for each in found if each.told}
-    return {path: value for path, value in values.items() if path in lists}
+        if each.told:
+            blocks.append(_block(".".join((*within, "fitted")), each, logs))
+    whole = "\n".join(blocks)
+    tomllib.loads(whole)
+    return whole
 
 
-def _set(table: Any, values: Mapping[str, Any], source: str) -> None:
-    """Set values in tables, each with its source as a comment."""
-    for name, value in values.items():
-        if isinstance(value, Mapping):
-            if name not in table:
-                table[name] = tomlkit.table()
-            _set(table[name], value, source)
-            continue
-        item = tomlkit.item(value)
-        item.comment(source)
-        if name in table:
-            table[name] = item
-        elif isinstance(table, Table) or not _first_table(table):
-            table.append(name, item)
-        else:
-            table.insert(0, name, item)
-
-
+def _block(table: str, each: Estimate, logs: Sequence[str]) -> str:
+    """The table of one number."""
+    low, high = (float(f"{end:.{_DIGITS}g}") for end in each.interval)
+    return (
+        f"[[{table}]]\n"
+        f'name = "{each.parameter.name}"\n'
+        f"low = {low!r}\nhigh = {high!r}  # {each.parameter.scale.unit}, 90 %\n"
+        f'source = "measured: fit of {", ".join(logs)}"\n'
+    )

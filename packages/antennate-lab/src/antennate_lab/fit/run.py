@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,12 +16,13 @@ from antennate.studies.trials import OnStep, no_step
 from antennate.types import Floats
 from antennate_lab.fit import least_squares, measures, recording, regression
 from antennate_lab.fit.config import FitConfig
-from antennate_lab.fit.estimates import Estimate, of_air, of_legs
+from antennate_lab.fit.estimates import Estimate, correlations, of_air, of_legs
 from antennate_lab.fit.least_squares import Problem
 from antennate_lab.fit.parameters import LEG, Parameter, changed, parameters
 from antennate_lab.fit.recording import Recording
 from antennate_lab.fit.regression import Known, is_walk
-from antennate_lab.fit.residuals import merged, moving
+from antennate_lab.fit.residuals import YAW_AXIS, merged, moving
+from antennate_lab.fit.result import FitResult, LogSummary, ParameterRow, StepRow
 from antennate_lab.fit.simulated import Course, simulated
 
 _GAINS = (0.5, 1.0, 2.0)
@@ -59,6 +61,58 @@ class FitOutcome:
     made: list[tuple[Course, Course]]
     found: list[Estimate]
     warnings: list[str]
+
+    @property
+    def rows(self) -> list[ParameterRow]:
+        """A row for each parameter."""
+        return [each.row() for each in self.found]
+
+    def result(self) -> FitResult:
+        """What the run comes to."""
+        return FitResult(
+            logs=[
+                LogSummary(
+                    name=each.name,
+                    sha256=each.sha256,
+                    steps=[course.name for course in each.courses],
+                    left_out=each.left_out,
+                    warnings=each.warnings,
+                )
+                for each in self.recordings
+            ],
+            parameters=self.rows,
+            steps=self._steps(),
+            correlations=correlations(self.found),
+            noise=_noise([course for _, course in self.courses]),
+            warnings=self.warnings,
+            simulate="antennate tunnel --robot robot.toml",
+        )
+
+    def _steps(self) -> list[StepRow]:
+        rows = []
+        for (log, course), (before, after) in zip(self.courses, self.made, strict=True):
+            if not len(moving(course)):
+                continue
+            three = (course, before, after)
+            lag = [1e3 * float(measures.lags(each).mean()) for each in three]
+            turns = [math.degrees(measures.turn(each)) for each in three]
+            turned = [None if math.isnan(each) else each for each in turns]
+            rows.append(
+                StepRow(
+                    log=log,
+                    step=course.name,
+                    fitted=course.name not in self.held,
+                    error_before_deg=math.degrees(measures.error(before, course)),
+                    error_deg=math.degrees(measures.error(after, course)),
+                    lag_ms=lag[0],
+                    lag_before_ms=lag[1],
+                    lag_after_ms=lag[2],
+                    turn_deg=turned[0],
+                    turn_before_deg=turned[1],
+                    turn_after_deg=turned[2],
+                )
+            )
+        return rows
 
 
 def run(config: FitConfig, workers: int | Workers, on_step: OnStep = no_step) -> FitOutcome:
@@ -239,3 +293,20 @@ def _odd_joints(robot: RobotSpec, courses: Sequence[tuple[str, Course]]) -> list
 def _holds(robot: RobotSpec, group: str, joint: int) -> bool:
     places = robot.places(group)  # type: ignore[arg-type]
     return places.start <= joint < places.stop
+
+
+def _noise(courses: Sequence[Course]) -> dict[str, float]:
+    """Noise of readings and gyroscope, and the zero of that, from steps in which nothing moves."""
+    still = [course for course in courses if not len(moving(course))]
+    told: dict[str, float] = {}
+    if still and still[0].counts.size:
+        told["counts"] = _spread([course.counts for course in still])
+    if still and still[0].gyro.size:
+        told["gyro"] = _spread([course.gyro[:, YAW_AXIS:] for course in still])
+        told["gyro_zero"] = float(np.mean([course.gyro[:, YAW_AXIS].mean() for course in still]))
+    return told
+
+
+def _spread(parts: Sequence[Floats]) -> float:
+    """Standard deviation of one sample, by the differences of neighbours."""
+    return float(np.median([np.std(np.diff(part, axis=0)) / np.sqrt(2.0) for part in parts]))

@@ -1,4 +1,4 @@
-"""A step of a protocol in the simulation: the commands of its log go in, what a robot feels comes out.
+"""A step of a protocol in the simulation: its commands go in, what a robot feels comes out.
 
 Each step starts from the posture that was measured at its beginning, so that nothing that went
 wrong before counts.

@@ -41,6 +41,19 @@ CLEARANCE = 0.002
 ANTENNA_PREFIXES = tuple(f"antenna_{side}_" for side in SIDES)
 
 
+class Fitted(Params):
+    """One number of a robot that was fitted to recordings."""
+
+    name: str = number("", "1", "assumed: has to be named")
+    """Path of the number, as `servos.xc430_w240.gain_divisor`, and its place in a list."""
+    low: float = number(0.0, "1", "assumed: has to be given")
+    """Lower end of the 90 % interval, in the unit of the number."""
+    high: float = number(0.0, "1", "assumed: has to be given")
+    """Upper end."""
+    source: str = number("", "1", "assumed: not known")
+    """Logs that tell it."""
+
+
 class RobotSpec(Params):
     """A walking robot: links with a pair of legs each, yaw joints between them, two antennae."""
 
@@ -95,6 +108,8 @@ class RobotSpec(Params):
     servos: ServosParams = ServosParams()
     antenna: AntennaSpec = AntennaSpec()
     imu: ImuParams = ImuParams()
+    fitted: tuple[Fitted, ...] = number((), "1", "assumed: none; `antennate fit` writes them")
+    """Numbers that were fitted to recordings; nothing is computed from them."""
 
     @classmethod
     def named(cls, text: str | Path, folder: Path = Path()) -> Self:
@@ -149,10 +164,12 @@ class RobotSpec(Params):
 
     @model_serializer(mode="wrap")
     def _without_what_is_absent(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """A robot without an inertial sensor is written as before there were any."""
+        """A robot without inertial sensor or fitted numbers is written as before there were any."""
         table = handler(self)
         if self.imu == ImuParams():
             table.pop("imu", None)
+        if not self.fitted:
+            table.pop("fitted", None)
         return table
 
     @property

@@ -16,7 +16,7 @@ from antennate.errors import ConfigError
 from antennate.files import decoded, read_limited, write_whole
 from antennate.params.base import LARGEST_FILE
 
-Value = str | int | float | bool | Sequence[str] | Sequence[int]
+Value = str | int | float | bool | Sequence[str] | Sequence[int] | Sequence[float]
 Key = tuple[str, ...]
 
 
