@@ -1,4 +1,4 @@
-"""Figures of `antennate fit`: errors before and after, a walk that the fit did not see, intervals."""
+"""Figures of `antennate fit`: errors before and after, a walk, intervals."""
 
 from __future__ import annotations
 

@@ -28,10 +28,10 @@ DRAWS = 400
 """Draws of a bootstrap."""
 _ROUNDS = 20
 """Most steps of a search."""
-_ENOUGH = 1e-3
-"""A search is done when a step improves the cost by less than this share."""
-_STEADY = 0.03
-"""And when the noise changes by less than this share."""
+_ENOUGH = 0.02
+"""A search goes over to pieces when a step improves the cost by less than this share."""
+_SHORT = 0.3
+"""A search is done when a step is shorter than this in all directions [standard deviations]."""
 _MOST_DAMPING = 1e3
 """A search is done, too, when no shorter step than that of this damping improves it."""
 
@@ -171,13 +171,11 @@ def solve(problem: Problem, begin: Floats, rounds: int = _ROUNDS) -> Solution:
     predicted = problem.predictions([(x, every)])[0]
     damping, by_piece = 1e-3, False
     for number in range(rounds):
-        before, problem.noise = problem.noise, noises(problem, predicted, by_piece)
-        pairs = zip(before, problem.noise, strict=True)
-        steady = all(np.allclose(*pair, rtol=_STEADY) for pair in pairs)
+        problem.noise = noises(problem, predicted, by_piece)
         cost = problem.cost(x, predicted)
         residuals, slopes = problem.residuals(predicted), problem.slopes(x, predicted)
         bend, pull = _normal(problem, x, residuals, slopes)
-        gain = 0.0
+        gain, step = 0.0, np.zeros_like(x)
         while damping < _MOST_DAMPING:
             step = _bounded(bend, pull, damping, low - x, high - x)
             new = problem.predictions([(x + step, every)])[0]
@@ -187,9 +185,10 @@ def solve(problem: Problem, begin: Floats, rounds: int = _ROUNDS) -> Solution:
                 x, predicted = x + step, new
                 break
         problem.on_step(number + 1, rounds)
-        if gain <= 0.0 or (steady and gain < _ENOUGH * cost):
-            if by_piece:
-                break
+        short = bool((abs(step) < _SHORT * np.sqrt(np.diag(np.linalg.inv(bend)))).all())
+        if by_piece and (short or gain <= 0.0):
+            break
+        if short or gain < _ENOUGH * cost:
             by_piece, damping = True, 1e-3
     problem.noise = noises(problem, predicted, by_piece=True)
     whole = zip(noises(problem, predicted), problem.least, strict=True)
@@ -236,10 +235,10 @@ def noises(problem: Problem, predicted: Sequence[Floats], by_piece: bool = False
         For each course, shape (1, C), or (n, C).
     """
     found = []
-    for course, least, simulated, measured in zip(
+    for course, least, made, measured in zip(
         problem.courses, problem.least, predicted, problem.measured, strict=True
     ):
-        square = (simulated - measured) ** 2
+        square = (made - measured) ** 2
         number = pieces(course) if by_piece else np.zeros(len(square), np.int64)
         means = [square[number == k].mean(axis=0) for k in range(number[-1] + 1)]
         rows = np.maximum(least, np.sqrt(means))

@@ -1,4 +1,4 @@
-"""What a step comes to in a few numbers: how late joints are, and how far the head turns a cycle."""
+"""What a step comes to in a few numbers: how late joints are, how far the head turns."""
 
 from __future__ import annotations
 

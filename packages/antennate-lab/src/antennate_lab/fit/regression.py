@@ -138,7 +138,7 @@ def regressed(
         _, ridge, missed[:, p] = min(fits, key=lambda fit: fit[0])
         found[p] = middle[p] + own @ (aim[:, p] / (size + ridge))
     sd = missed.std(axis=0)
-    return _corrected(Told(found, sd, np.corrcoef(missed.T)), proposal, prior)
+    return _corrected(Told(found, sd, np.atleast_2d(np.corrcoef(missed.T))), proposal, prior)
 
 
 def _corrected(told: Told, proposal: Known, prior: Known) -> Told:
@@ -179,7 +179,7 @@ def search(
         on_step: Told of each robot, of both rounds.
     """
     measured = np.concatenate([felt(made(prior.mean), course) for course in courses])
-    proposal = prior
+    proposal, told = prior, Told(prior.mean, prior.sd, np.eye(len(prior.mean)))
     for number in range(2):
         places = drawn(chosen, proposal, count, rng)
         features = walked(

@@ -17,17 +17,10 @@ _DIGITS = 5
 def values_of(found: Sequence[Estimate]) -> dict[str, float | list[float]]:
     """What a robot's file says of what is told, by path; a list with all of its entries."""
     values: dict[str, float | list[float]] = {}
-    lists = {each.parameter.path for each in found if each.told}
-    for each in found:
-        path, value = each.parameter.path, float(f"{each.value:.{_DIGITS}g}")
-        if path not in lists:
-            continue
-        if each.parameter.place is None:
-            values[path] = value
-        else:
-            entries = values.setdefault(path, [])
-            assert isinstance(entries, list)
-            entries.append(value)
+    for path in dict.fromkeys(each.parameter.path for each in found if each.told):
+        own = [each for each in found if each.parameter.path == path]
+        numbers = [float(f"{each.value:.{_DIGITS}g}") for each in own]
+        values[path] = numbers[0] if own[0].parameter.place is None else numbers
     return values
 
 
@@ -50,9 +43,8 @@ def written(text: str, found: Sequence[Estimate], logs: Sequence[str]) -> str:
     for path, value in values_of(found).items():
         changes[(*within, *path.split("."))] = value
     blocks = [edited(tomlkit.dumps(document), changes).rstrip() + "\n"]
-    for each in found:
-        if each.told:
-            blocks.append(_block(".".join((*within, "fitted")), each, logs))
+    table = ".".join((*within, "fitted"))
+    blocks += [_block(table, each, logs) for each in found if each.told]
     whole = "\n".join(blocks)
     tomllib.loads(whole)
     return whole
