@@ -28,7 +28,7 @@ BINS = 10
 """Parts of a cycle over which what is felt is a mean."""
 WIDER = 2.0
 """A second round draws from a distribution so many times as wide as what the first has found."""
-_RIDGES = 10.0 ** np.arange(-4.0, 3.0, 0.5)
+_RIDGES = 10.0 ** np.arange(-3.0, 3.0, 0.25)
 
 
 @dataclass(frozen=True)
@@ -131,9 +131,9 @@ def regressed(
         fits = []
         for ridge in _RIDGES:
             shrink = size / (size + ridge)
-            hat = np.einsum("ij,j,ij->i", left, shrink, left)
+            hat = np.einsum("ij,j,ij->i", left, shrink, left) + 1.0 / len(places)
             away = places[:, p] - middle[p] - left @ (shrink * aim[:, p])
-            away = away / np.maximum(1.0 - hat, 1e-3)
+            away = away / np.maximum(1.0 - hat, 1e-9)
             fits.append((float((away**2).mean()), ridge, away))
         _, ridge, missed[:, p] = min(fits, key=lambda fit: fit[0])
         found[p] = middle[p] + own @ (aim[:, p] / (size + ridge))

@@ -6,6 +6,7 @@ wrong before counts.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -51,8 +52,15 @@ class Course:
     counts: Floats
 
 
-def simulated(robot: RobotSpec, course: Course) -> Course:
+def simulated(
+    robot: RobotSpec, course: Course, look: Callable[[World], object] = lambda world: None
+) -> Course:
     """What the simulation of a robot makes of the commands of a course.
+
+    Args:
+        robot: The robot.
+        course: Its commands, and the posture in which it begins.
+        look: Called with the world at each tick of the course.
 
     Raises:
         SimulationError: The robot falls over or flies apart.
@@ -66,6 +74,8 @@ def simulated(robot: RobotSpec, course: Course) -> Course:
     felt = []
     for tick, angles in enumerate([*[course.commands[0]] * before, *course.commands]):
         felt.append(sim.read())
+        if tick >= before:
+            look(world)
         sim.write(command(robot, angles))
         sim.sleep_until((tick + 1) * course.period)
     for failure in sim.failures.values():
