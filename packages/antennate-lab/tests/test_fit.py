@@ -1,0 +1,309 @@
+"""Fits to logs of a protocol: what is found of known numbers, and what is refused."""
+
+from __future__ import annotations
+
+import importlib.util
+import math
+import tomllib
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from types import ModuleType
+
+import numpy as np
+import pytest
+from protocol_logs import CONTROL, sweeps, write
+from scipy import signal
+
+from antennate.control.protocol import Protocol, Step
+from antennate.errors import BadInputError, LogError
+from antennate.hardware.config import RobotConfig
+from antennate.robots.spec import RobotSpec
+from antennate.studies.pool import Workers
+from antennate.types import Floats
+from antennate_lab.fit import least_squares, measures, recording, regression, robot_file
+from antennate_lab.fit.config import FitConfig
+from antennate_lab.fit.estimates import Estimate
+from antennate_lab.fit.parameters import LEG, SCALES, changed, parameters
+from antennate_lab.fit.run import run
+from antennate_lab.fit.simulated import Course, simulated
+
+SMALL = RobotSpec(links=2, mass=0.8, antennae={"kind": "none"})  # type: ignore[arg-type]
+"""One yaw joint and four legs: a model that is quick."""
+GAIN, DELAY, INERTIA = 190.0, 0.012, 0.0045
+
+
+def linear(goals: Floats) -> Floats:
+    """Angles of a linear servo with these numbers: I q'' + D q' + K (q - goal(t - delay)) = 0."""
+    servo = SMALL.servos.xc430_w240.model_copy(update={"gain_divisor": GAIN})
+    fine = 10
+    t = np.arange(len(goals) * fine) * CONTROL.period / fine
+    late = np.floor((t - DELAY) / CONTROL.period + 1e-9).astype(int)
+    held = np.where(late < 0, goals[0], goals[np.clip(late, 0, None)])
+    inertia = INERTIA + 0.020 * (2 * 0.025**2 / 5 + 0.008**2)  # of an ellipsoid off its axle
+    plant = ([servo.stiffness], [inertia, servo.damping, servo.stiffness])
+    return signal.lsim(plant, held - goals[0], t, interp=False)[1][::fine] + goals[0]
+
+
+def of_joint(name: str) -> Callable[[Step, Floats], Floats]:
+    """What is measured if one joint of SMALL follows as `linear` says."""
+    place = SMALL.joint_names.index(name)
+
+    def measured(step: Step, goals: Floats) -> Floats:
+        positions = goals.copy()
+        positions[:, place] = linear(goals[:, place])
+        return positions
+
+    return measured
+
+
+def test_numbers_of_a_joint_alone_are_those_of_a_formula(tmp_path: Path) -> None:
+    """The air: a log whose leg follows a linear equation is fitted by the whole simulation."""
+    protocol = sweeps(SMALL, "leg_l0", seconds=2.0)
+    path = write(tmp_path / "drive.mcap", SMALL, protocol, of_joint("leg_l0"))
+    courses = recording.read(path, SMALL).courses
+    names = [(f"servos.xc430_w240.{name}", None) for name in ("gain_divisor", "delay", "armature")]
+    problem = least_squares.Problem(SMALL, courses, parameters(SMALL, names), Workers(1))
+    solution = least_squares.solve(problem, problem.start + np.array([0.0, 0.005, 0.0]))
+    gain, delay, inertia = (
+        each.value(x) for each, x in zip(problem.chosen, solution.x.tolist(), strict=True)
+    )
+    assert gain == pytest.approx(GAIN, rel=0.01)
+    assert delay == pytest.approx(DELAY, abs=5e-4)
+    assert inertia == pytest.approx(INERTIA, rel=0.1)  # its resonance, at a timestep of 2 ms
+    covariance, draws = least_squares.covariances(problem, solution, np.random.default_rng(1))
+    assert (np.sqrt(np.diag(covariance)) < [0.01, 1e-3, 0.1]).all()
+    assert (draws.std(axis=0) < [0.01, 1e-3, 0.1]).all()
+
+
+def test_lag_is_the_shift_of_a_sine() -> None:
+    """Angles that come 30 ms late have that lag; a head that turns steadily its rate times 2 s."""
+    t = np.arange(0.0, 4.0, 0.01)
+    goals, angles = (0.3 * np.sin(math.pi * (t - late))[:, None] for late in (0.0, 0.03))
+    turning = np.tile([0.0, 0.0, 0.25], (len(t), 1))
+    course = Course("step", False, 0.01, 2.0, goals, angles, turning, np.zeros((len(t), 0)))
+    assert measures.lags(course) == pytest.approx([0.03], rel=0.01)
+    assert measures.turn(course) == pytest.approx(0.5, rel=1e-6)
+
+
+def test_regression_knows_what_a_linear_model_tells() -> None:
+    """Of two numbers one is seen through noise of 0.1 in each of 25 features, one not at all."""
+    rng = np.random.default_rng(5)
+    prior = regression.Known(np.zeros(2), np.ones(2))
+    seen = np.zeros((2, 25))
+    seen[0] = 50.0
+    places = prior.draw(400, rng)
+    features = places @ seen + 5.0 * rng.standard_normal((400, 25))
+    truth = np.array([0.7, 0.9])
+    told = regression.regressed(places, features, truth @ seen, prior, prior)
+    sure = 0.1 / math.sqrt(25)  # of the mean of 25
+    assert told.mean[0] == pytest.approx(0.7, abs=3 * sure)
+    assert told.sd[0] == pytest.approx(sure, rel=0.3)
+    assert told.mean[1] == pytest.approx(0.0, abs=0.2)
+    assert told.sd[1] == pytest.approx(1.0, rel=0.15)
+
+
+def test_friction_of_a_leg_is_the_common_one_times_its_own() -> None:
+    """Frictions of single legs become their median, and factors of it."""
+    chosen = parameters(SMALL, [(LEG, place) for place in range(4)])
+    robot = changed(SMALL, chosen, [0.4, 0.4, 0.2, 0.4])
+    assert robot.leg_friction == 0.4
+    assert robot.legs.friction_factors == (1.0, 1.0, 0.5, 1.0)
+
+
+def test_backlash_drives_what_a_simulation_feels() -> None:
+    """A course in the air is another one with backlash, and the same one without."""
+    robot = RobotSpec(imu={"kind": "head"})  # type: ignore[arg-type]
+    goals = np.zeros((100, 19))
+    goals[:, 2] = 0.2 * np.sin(np.arange(100) * 0.1)
+    none = np.zeros((100, 0))
+    course = Course("yaw3", True, 0.01, 0.0, goals, goals, none, none)
+    (backlash,) = parameters(robot, [("yaw.backlash", 2)])
+    loose = changed(robot, [backlash], [0.03])
+    tight, same, slack = (simulated(each, course).gyro for each in (robot, robot, loose))
+    assert (tight == same).all()
+    assert abs(slack - tight)[:, 2].max() > 0.02
+
+
+def test_log_of_another_robot_is_refused(tmp_path: Path) -> None:
+    """Links and servo models of a log and of the robot's file have to agree."""
+    path = write(tmp_path / "drive.mcap", SMALL, sweeps(SMALL, "leg_l0"))
+    longer = RobotSpec(links=3, antennae={"kind": "none"})  # type: ignore[arg-type]
+    with pytest.raises(BadInputError, match="expected the robot of --robot with links 3, found 2"):
+        recording.read(path, longer)
+    other = RobotSpec.model_validate(
+        SMALL.model_dump() | {"legs": {"servo": "xl430_w250", "fastest": 4.5}}
+    )
+    with pytest.raises(BadInputError, match="servo_names xl430_w250, found xc430_w240"):
+        recording.read(path, other)
+
+
+def test_protocol_cut_in_half_is_named(tmp_path: Path) -> None:
+    """What is there is used, and what is missing is said."""
+    protocol = sweeps(SMALL, "leg_l0", "leg_r0", "leg_l1")
+    path = write(tmp_path / "drive.mcap", SMALL, protocol, ticks=300)
+    found = recording.read(path, SMALL)
+    assert [course.name for course in found.courses] == ["leg_l0"]
+    assert set(found.left_out) == {"leg_r0", "leg_l1"}
+    assert "2 of 3 steps of the protocol are missing, from leg_r0 on" in found.warnings[0]
+    nothing = write(tmp_path / "short.mcap", SMALL, protocol, ticks=100)
+    with pytest.raises(BadInputError, match="expected whole steps"):
+        recording.read(nothing, SMALL)
+
+
+@pytest.mark.parametrize(
+    ("loop", "board", "words"),
+    [(1.0, 1.01, "clock of the antenna board runs +1.0 %"), (1.01, 1.0, "tick lasts 10.1")],
+)
+def test_clock_that_drifts_is_named(tmp_path: Path, loop: float, board: float, words: str) -> None:
+    """A clock that is 1 % too fast, and none that is right."""
+    protocol = sweeps(SMALL, "leg_l0")
+    right = write(tmp_path / "right.mcap", SMALL, protocol)
+    assert recording.read(right, SMALL).warnings == []
+    path = write(tmp_path / "drive.mcap", SMALL, protocol, loop=loop, board=board)
+    (warning,) = recording.read(path, SMALL).warnings
+    assert words in warning
+
+
+def test_log_of_no_protocol_is_refused(tmp_path: Path) -> None:
+    """The log of another drive has no steps."""
+    path = write(tmp_path / "drive.mcap", SMALL, Protocol(steps=sweeps(SMALL, "yaw1").steps))
+    empty = tmp_path / "empty.mcap"
+    empty.write_bytes(path.read_bytes()[:100])
+    with pytest.raises(LogError):
+        recording.read(empty, SMALL)
+    with pytest.raises(BadInputError, match="expected logs"):
+        run(FitConfig(), 1)
+
+
+TEXT = """\
+# the robot of room 3
+links = 6  # as built
+
+[servos.xc430_w240]
+friction = 0.02  # by hand
+"""
+
+
+def estimates() -> list[Estimate]:
+    """A gain and a backlash that are told, a delay that is not."""
+    names = [
+        ("servos.xc430_w240.gain_divisor", None),
+        ("servos.xc430_w240.delay", None),
+        ("yaw.backlash", 0),
+        *(("yaw.backlash", place) for place in range(1, 5)),
+    ]
+    values = [170.0, 0.004, 0.01, 0.0, 0.0, 0.0, 0.0]
+    return [
+        Estimate(each, value, (0.9 * value, 1.1 * value), told, "air", np.zeros(9))
+        for each, value, told in zip(
+            parameters(RobotSpec(), names), values, [True, False, *[True] * 5], strict=True
+        )
+    ]
+
+
+def test_robot_file_keeps_what_it_says(tmp_path: Path) -> None:
+    """Comments stay, told numbers stand with their intervals, and a robot reads the file."""
+    text = robot_file.written(TEXT, estimates(), ["drive-3"])
+    for line in ("# the robot of room 3", "links = 6  # as built", "friction = 0.02  # by hand"):
+        assert line in text
+    path = tmp_path / "robot.toml"
+    path.write_text(text, encoding="utf-8")
+    robot = RobotSpec.named(path)
+    assert robot.servos.xc430_w240.gain_divisor == 170.0
+    assert robot.servos.xc430_w240.delay == 0.0
+    assert robot.yaw.backlash == (0.01, 0.0, 0.0, 0.0, 0.0)
+    (gain,) = [each for each in robot.fitted if each.name.endswith("gain_divisor")]
+    assert (gain.low, gain.high, gain.source) == (153.0, 187.0, "measured: fit of drive-3")
+    again = robot_file.written(text, estimates(), ["drive-4"])
+    assert len(tomllib.loads(again)["fitted"]) == len(robot.fitted) == 6
+
+
+def test_table_of_a_robot_in_its_file_is_changed(tmp_path: Path) -> None:
+    """A robot.toml of `drive` has the robot in a table; all else in it stays."""
+    path = tmp_path / "robot.toml"
+    path.write_text('[robot]\nlinks = 6\n\n[ports]\nbus = "/dev/ttyUSB1"\n', encoding="utf-8")
+    config = FitConfig(robot=str(path))
+    assert config.described.links == 6
+    path.write_text(robot_file.written(config.text, estimates(), ["drive"]), encoding="utf-8")
+    table = tomllib.loads(path.read_text(encoding="utf-8"))
+    assert table["ports"] == {"bus": "/dev/ttyUSB1"}
+    assert table["robot"]["servos"]["xc430_w240"] == {"gain_divisor": 170.0}
+    del table["ports"]
+    assert RobotConfig.model_validate(table | {}, strict=False).robot.fitted[0].high == 187.0
+    assert FitConfig(robot=str(path)).described.yaw.backlash[0] == 0.01
+
+
+def test_every_scale_is_within_the_bounds_of_its_field() -> None:
+    """What a search may reach is a robot: at both ends of each scale."""
+    robot = RobotSpec(imu={"kind": "head"})  # type: ignore[arg-type]
+    names = [
+        *(
+            (f"servos.xc430_w240.{name}", None)
+            for name in ("gain_divisor", "armature", "friction", "load_friction", "delay")
+        ),
+        ("legs.gain_factor", None),
+        ("yaw.backlash", 1),
+        ("antenna.three_coil_stiffness_n_mm_per_deg", None),
+        ("antenna.damping_time", None),
+        ("antenna.sensor.bend_gain", None),
+        ("antennae.right_stiffness", None),
+        ("antennae.right_gain", None),
+        (LEG, 0),
+    ]
+    chosen = parameters(robot, names)
+    assert {each.scale.unit for each in chosen} <= {scale.unit for scale in SCALES.values()}
+    for each in chosen:
+        for end in (each.scale.low, each.scale.high):
+            assert changed(robot, [each], [end]).links == 6
+
+
+def _identified() -> ModuleType:
+    path = Path(__file__).parents[3] / "docs" / "science" / "identified.py"
+    spec = importlib.util.spec_from_file_location("identified", path)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.mark.slow
+def test_hidden_robot_is_found(tmp_path: Path) -> None:
+    """The whole: a robot that the fit does not see, recorded with noise, is found from its log."""
+    identified = _identified()
+    hidden = identified.hidden(11, 0)
+    kinds = ("leg_l0", "yaw2", "yaw4", "antenna_l_base", "antenna_r_base")
+    steps = [*sweeps(identified.KNOWN, *kinds, seconds=4.0).steps, Step(name="still", seconds=1.0)]
+    protocol = Protocol(steps=tuple(steps)).made_for(identified.KNOWN, CONTROL)
+    identified.record(hidden, protocol, tmp_path / "drive.mcap", 0)
+    known = tmp_path / "known.toml"
+    known.write_text('[imu]\nkind = "head"\n', encoding="utf-8")
+    config = FitConfig(log=(str(tmp_path / "drive.mcap"),), robot=str(known))
+    found = {row.name: row for row in run(config, 2).rows}
+    gain = found["servos.xc430_w240.gain_divisor"]
+    assert gain.value == pytest.approx(hidden.servos.xc430_w240.gain_divisor, rel=0.01)
+    assert not found["yaw.backlash[0]"].told
+    assert "leg_friction" not in found
+    stiffness = found["antenna.three_coil_stiffness_n_mm_per_deg"].value
+    truth = hidden.antenna.three_coil_stiffness_n_mm_per_deg
+    assert stiffness == pytest.approx(truth, rel=0.05)
+
+
+def test_unknown_step_to_leave_out_is_refused(tmp_path: Path) -> None:
+    """The message says which steps there are."""
+    path = write(tmp_path / "drive.mcap", SMALL, sweeps(SMALL, "leg_l0"))
+    robot = tmp_path / "small.toml"
+    robot.write_text('links = 2\nmass = 0.8\n\n[antennae]\nkind = "none"\n', encoding="utf-8")
+    config = FitConfig(log=(str(path),), robot=str(robot), leave_out=("leg_l9",))
+    with pytest.raises(BadInputError, match="expected steps of the logs, leg_l0, found leg_l9"):
+        run(config, 1)
+
+
+def test_simulation_begins_where_the_step_began() -> None:
+    """The first angle is that of the measurement, whatever was commanded before."""
+    goals = np.full((30, 5), 0.1)
+    none = np.zeros((30, 0))
+    course = Course("still", False, 0.01, 0.0, goals, goals, none, none)
+    begun = replace(course, positions=goals + 0.0)
+    assert simulated(SMALL, begun).positions[0] == pytest.approx(goals[0], abs=0.02)
