@@ -10,7 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from antennate.errors import ConfigError
-from antennate.hardware.setup.robot_toml import change, edited
+from antennate.hardware.setup.robot_toml import change
+from antennate.params.toml_text import edited
 
 MINE = """\
 # my robot

@@ -77,9 +77,9 @@ def of_air(
     """Estimates by least squares; the wider one of the Hessian's and the bootstrap's interval."""
     sd = np.maximum(np.sqrt(np.diag(covariance)), draws.std(axis=0))
     low, high = bounds(problem.chosen)
-    found = []
+    found, swept = [], problem.swept()
     for p, each in enumerate(problem.chosen):
-        told = bool(problem.told[:, p].any() and sd[p] < TOLD * each.scale.spread)
+        told = bool(swept[p] and sd[p] < TOLD * each.scale.spread)
         middle = solution.x[p] if told else problem.start[p]
         ends = np.clip(middle + LEVEL * np.array([-1.0, 1.0]) * sd[p], low[p], high[p])
         interval = (each.value(ends[0]), each.value(ends[1]))

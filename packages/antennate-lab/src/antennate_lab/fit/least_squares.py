@@ -18,7 +18,7 @@ from antennate.robots.spec import RobotSpec
 from antennate.studies.pool import Workers, gather
 from antennate.studies.trials import OnStep, no_step
 from antennate.types import Bools, Floats, Ints
-from antennate_lab.fit.parameters import Parameter, bounds, changed
+from antennate_lab.fit.parameters import BACKLASH, Parameter, bounds, changed
 from antennate_lab.fit.residuals import NOISE, channels, labels, moving, pieces
 from antennate_lab.fit.simulated import Course, simulated
 
@@ -72,18 +72,19 @@ class Problem:
             for course in self.courses
         ]
         self.measured = [channels(self.robot, course, course) for course in self.courses]
-        self.told = np.array([self._tells(course) for course in self.courses]).reshape(
+        self.told = np.array([*map(self._tells, self.courses, self.measured)]).reshape(
             len(self.courses), len(self.chosen)
         )
         self.start = np.array([each.searched(each.start) for each in self.chosen])
         self.spread = np.array([each.scale.spread for each in self.chosen])
 
-    def _tells(self, course: Course) -> Bools:
+    def _tells(self, course: Course, measured: Floats) -> Bools:
         """Which parameters change what is measured in a course."""
         joints = moving(course).tolist()
         servos = {self.robot.servo_names[joint] for joint in joints}
         own = {self.robot.joint_names[joint] for joint in joints}
-        reads = any(kind == "counts" for kind, _ in labels(self.robot, course))
+        kinds = [kind for kind, _ in labels(self.robot, course)]
+        reads = any(measured[:, at].any() for at, kind in enumerate(kinds) if kind == "counts")
 
         def depends(each: Parameter) -> bool:
             group, _, rest = each.path.partition(".")
@@ -91,11 +92,26 @@ class Problem:
                 return rest.partition(".")[0] in servos
             if group == "legs":
                 return not own.isdisjoint(self.robot.leg_names)
-            if group == "yaw":
-                return self.robot.yaw_names[each.place or 0] in own
+            if group == "yaw":  # what swings on one joint, swings on the next
+                return not own.isdisjoint(self.robot.yaw_names)
             return reads
 
         return np.array([depends(each) for each in self.chosen], bool)
+
+    def swept(self) -> Bools:
+        """Parameters that steps tell; of the backlash of a yaw joint, those in which it moves."""
+        own = {
+            self.robot.joint_names[joint]
+            for course in self.courses
+            for joint in moving(course).tolist()
+        }
+        names = self.robot.yaw_names
+        return np.array(
+            [
+                self.told[:, p].any() and (each.path != BACKLASH or names[each.place or 0] in own)
+                for p, each in enumerate(self.chosen)
+            ]
+        )
 
     def made(self, x: Floats) -> RobotSpec:
         """The robot at a place of the search."""
@@ -188,13 +204,31 @@ def solve(problem: Problem, begin: Floats, rounds: int = _ROUNDS) -> Solution:
         short = bool((abs(step) < _SHORT * np.sqrt(np.diag(np.linalg.inv(bend)))).all())
         if by_piece and (short or gain <= 0.0):
             break
-        if short or gain < _ENOUGH * cost:
+        if not by_piece and (short or gain < _ENOUGH * cost):
             by_piece, damping = True, 1e-3
+            x, predicted = _without_small_plays(problem, x, predicted)
     problem.noise = noises(problem, predicted, by_piece=True)
     whole = zip(noises(problem, predicted), problem.least, strict=True)
     misfit = float(np.mean([((noise / least) ** 2).mean() for noise, least in whole]))
     slopes = problem.slopes(x, predicted)
     return Solution(x, misfit, problem.residuals(predicted), slopes)
+
+
+def _without_small_plays(
+    problem: Problem, x: Floats, predicted: list[Floats]
+) -> tuple[Floats, list[Floats]]:
+    """The place with those small backlashes at 0 that the courses do not need.
+
+    The ends of a play are soft, so that one of nearly 0 differs from none, and a search stays.
+    """
+    every = np.arange(len(problem.courses))
+    for p, each in enumerate(problem.chosen):
+        if each.path == BACKLASH and 0.0 < x[p] < each.scale.nudge:
+            none = np.where(np.arange(len(x)) == p, 0.0, x)
+            new = problem.predictions([(none, every)])[0]
+            if problem.cost(none, new) < problem.cost(x, predicted):
+                x, predicted = none, new
+    return x, predicted
 
 
 def _normal(

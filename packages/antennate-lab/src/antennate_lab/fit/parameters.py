@@ -20,6 +20,8 @@ from antennate.types import Floats
 
 LEG = "legs.friction"
 """Friction of one leg on the floor: `leg_friction` times its `legs.friction_factors`."""
+BACKLASH = "yaw.backlash"
+"""Backlash of one yaw joint."""
 
 
 @dataclass(frozen=True)
@@ -117,7 +119,7 @@ def _value(robot: RobotSpec, path: str, place: int | None) -> float:
 
 def _list(robot: RobotSpec, path: str) -> tuple[float, ...]:
     """A list of the robot in full, also where its file leaves it empty."""
-    if path == "yaw.backlash":
+    if path == BACKLASH:
         return robot.backlash
     return robot.legs.friction_factors or (1.0,) * robot.leg_count
 

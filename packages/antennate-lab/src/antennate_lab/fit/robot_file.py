@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 
 import tomlkit
 
-from antennate.hardware.setup.robot_toml import Key, Value, edited
+from antennate.params.toml_text import Key, Value, edited
 from antennate_lab.fit.estimates import Estimate
 
 _DIGITS = 5

@@ -18,7 +18,7 @@ from antennate_lab.fit import least_squares, measures, recording, regression
 from antennate_lab.fit.config import FitConfig
 from antennate_lab.fit.estimates import Estimate, correlations, of_air, of_legs
 from antennate_lab.fit.least_squares import Problem
-from antennate_lab.fit.parameters import LEG, Parameter, changed, parameters
+from antennate_lab.fit.parameters import BACKLASH, LEG, Parameter, changed, parameters
 from antennate_lab.fit.recording import Recording
 from antennate_lab.fit.regression import Known, is_walk
 from antennate_lab.fit.residuals import YAW_AXIS, merged, moving
@@ -209,7 +209,7 @@ def _names(robot: RobotSpec) -> list[tuple[str, int | None]]:
         names += [(f"servos.{servo}.{name}", None) for name in own]
     if robot.legs.servo == robot.yaw.servo:
         names.append(("legs.gain_factor", None))
-    names += [("yaw.backlash", place) for place in range(robot.yaw_count)]
+    names += [(BACKLASH, place) for place in range(robot.yaw_count)]
     if robot.antenna_count:
         names += [
             ("antenna.three_coil_stiffness_n_mm_per_deg", None),

@@ -26,10 +26,10 @@ from antennate.errors import ConfigError, reason
 from antennate.files import write_whole
 from antennate.hardware.config import RobotFile
 from antennate.hardware.ports.finder import read_key
-from antennate.hardware.setup.robot_toml import edited
 from antennate.hardware.setup.zeros import measured
 from antennate.host import LEVEL, urgent
 from antennate.params.base import changes, paths_of
+from antennate.params.toml_text import edited
 from antennate.robots.antenna import SensorParams
 from antennate.robots.spec import RobotSpec
 from antennate.sim.world import World

@@ -2,22 +2,17 @@
 
 from __future__ import annotations
 
-import tomllib
 from codecs import BOM_UTF8
-from collections.abc import Mapping, MutableMapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 import tomlkit
 from tomlkit.exceptions import TOMLKitError
-from tomlkit.items import InlineTable
 
 from antennate.errors import ConfigError
 from antennate.files import decoded, read_limited, write_whole
 from antennate.params.base import LARGEST_FILE
-
-Value = str | int | float | bool | Sequence[str] | Sequence[int] | Sequence[float]
-Key = tuple[str, ...]
+from antennate.params.toml_text import Key, Value, edited
 
 
 def change(path: Path, values: Mapping[Key, Value]) -> None:
@@ -61,26 +56,3 @@ def _read_and_edited(path: Path, values: Mapping[Key, Value]) -> tuple[bytes, by
     if "\r\n" in text and text.count("\n") == text.count("\r\n"):
         changed = changed.replace("\r\n", "\n").replace("\n", "\r\n")
     return data, (BOM_UTF8 if data.startswith(BOM_UTF8) else b"") + changed.encode()
-
-
-def edited(text: str, values: Mapping[Key, Value]) -> str:
-    """The text with keys set."""
-    document = tomlkit.parse(text)
-    for (*tables, name), value in values.items():
-        table: MutableMapping[str, Any] = document
-        for place, part in enumerate(tables):
-            if part not in table:
-                table[part] = (
-                    tomlkit.inline_table()
-                    if isinstance(table, InlineTable)
-                    else tomlkit.table(is_super_table=place + 1 < len(tables))
-                )
-            table = table[part]
-            if not isinstance(table, MutableMapping):
-                raise ValueError(f"{'.'.join(tables[: place + 1])} = {table!r}")
-        if name not in table or table[name] != value:
-            table[name] = list(value) if isinstance(value, tuple) else value
-    changed = tomlkit.dumps(document)
-    if tomllib.loads(changed) != document.unwrap():
-        raise ValueError("tables in a form that would be spoilt")
-    return changed
