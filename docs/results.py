@@ -1,4 +1,4 @@
-"""Write the tables of docs/results.md and docs/tracks.md; with --check only compare them.
+"""Write the tables of docs/results.md, docs/tracks.md and docs/fit.md; with --check only compare them.
 
 A table stands between `<!-- results of NAME -->` and `<!-- end -->`: the keys of result.json and
 the columns of trials.csv of an experiment, from the classes of its result and of its rows.
@@ -17,7 +17,7 @@ from antennate import experiments
 from antennate.params.base import docstrings
 from antennate.studies.columns import columns, named
 
-PAGES = ("results", "tracks")
+PAGES = ("results", "tracks", "fit")
 PART = re.compile(r"(<!-- results of (\w+) -->\n).*?(<!-- end -->\n)", re.DOTALL)
 KNOWN = ("schema", "command")
 """Keys of every result, which the page explains once."""

@@ -80,10 +80,10 @@ def record(robot: RobotSpec, protocol: Protocol, path: Path, seed: int) -> None:
 def _ticks(robot: RobotSpec, protocol: Protocol, rng: np.random.Generator) -> Iterator[Tick]:
     """Ticks of the whole protocol; hanging steps and those on the floor in a world each."""
     period, number = CONTROL.period, 0
+    chance = Disturbance(rng, _NOISY, robot, period)
     for hanging in (True, False):
         steps = [step for step in protocol.steps if (step.place == "hanging") == hanging]
         sim = SimRobot(1, robot, period, PHYSICS.timestep)
-        chance = Disturbance(rng, _NOISY, robot, period)
         sim.load(0, world_of(robot, hanging), chance)
         for at, (angles, events) in enumerate(_courses(steps, robot), 1):
             frame, number = sim.read(), number + 1

@@ -7,7 +7,7 @@ is taken between two ticks.
 from __future__ import annotations
 
 import hashlib
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -38,7 +38,9 @@ class Recording:
     Attributes:
         name: Name of its file, without the ending.
         sha256: Hash of its bytes.
-        courses: Steps that can be compared.
+        courses: Steps that can be compared, the gyroscope less its zero.
+        gyro_zero: Mean of the gyroscope where the head came back to where it was [rad/s], shape
+            (3,), or (0,) without one.
         left_out: Steps of the protocol that cannot, and why.
         warnings: What else is wrong with the log.
     """
@@ -46,6 +48,7 @@ class Recording:
     name: str
     sha256: str
     courses: list[Course]
+    gyro_zero: Floats
     left_out: dict[str, str]
     warnings: list[str]
 
@@ -89,7 +92,15 @@ def read(path: Path, robot: RobotSpec) -> Recording:
             f"{len(missing)} of {len(planned)} steps of the protocol are missing, from "
             f"{missing[0]} on; give the folder to `drive --protocol` again to record them"
         )
-    return Recording(path.stem, _hash(path), courses, left_out, warnings)
+    zero = _gyro_zero(courses)
+    courses = [replace(course, gyro=course.gyro - zero) for course in courses]
+    return Recording(path.stem, _hash(path), courses, zero, left_out, warnings)
+
+
+def _gyro_zero(courses: list[Course]) -> Floats:
+    """Zero of the gyroscope, from steps in the air and from standing; 0 if there are none."""
+    still = [course.gyro.mean(axis=0) for course in courses if not course.cycle]
+    return np.median(still, axis=0) if still else np.zeros(courses[0].gyro.shape[1])
 
 
 def _require_same(path: Path, logged: RobotSpec, robot: RobotSpec) -> None:

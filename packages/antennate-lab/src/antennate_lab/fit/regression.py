@@ -57,10 +57,14 @@ class Known:
 
 
 def felt(robot: RobotSpec, course: Course) -> Floats:
-    """Means over parts of a cycle of how far joints lag and of the head's turning, shape (F,)."""
+    """Means over parts of a cycle of how far joints lag and of the head's turning, shape (F,).
+
+    The first half of a cycle is left out: how the robot came to stand is not known.
+    """
     lag = (course.positions - course.commands)[:, moving(course)]
     values = np.concatenate([lag / NOISE["position"], course.gyro / NOISE["gyro"]], axis=1)
     width = max(1, round(course.cycle / course.period / BINS))
+    values = values[BINS // 2 * width :]
     count = len(values) // width
     return np.nan_to_num(values[: count * width].reshape(count, width, -1).mean(axis=1).ravel())
 

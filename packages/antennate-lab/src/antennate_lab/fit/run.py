@@ -83,7 +83,7 @@ class FitOutcome:
             parameters=self.rows,
             steps=self._steps(),
             correlations=correlations(self.found),
-            noise=_noise([course for _, course in self.courses]),
+            noise=_noise(self.recordings),
             warnings=self.warnings,
             simulate="antennate tunnel --robot robot.toml",
         )
@@ -295,15 +295,16 @@ def _holds(robot: RobotSpec, group: str, joint: int) -> bool:
     return places.start <= joint < places.stop
 
 
-def _noise(courses: Sequence[Course]) -> dict[str, float]:
+def _noise(recordings: Sequence[Recording]) -> dict[str, float]:
     """Noise of readings and gyroscope, and the zero of that, from steps in which nothing moves."""
-    still = [course for course in courses if not len(moving(course))]
+    still = [course for each in recordings for course in each.courses if not len(moving(course))]
     told: dict[str, float] = {}
     if still and still[0].counts.size:
         told["counts"] = _spread([course.counts for course in still])
     if still and still[0].gyro.size:
         told["gyro"] = _spread([course.gyro[:, YAW_AXIS:] for course in still])
-        told["gyro_zero"] = float(np.mean([course.gyro[:, YAW_AXIS].mean() for course in still]))
+    if recordings[0].gyro_zero.size:
+        told["gyro_zero"] = float(recordings[0].gyro_zero[YAW_AXIS])
     return told
 
 

@@ -58,7 +58,7 @@ _GROUPS = {
 _FIRST = ("tunnel", "calibrate", "study", "twin", "drive")
 _EXPERIMENTS = (
     *("tunnel", "compete", "gait", "geometry", "climb", "calibrate", "bench", "antenna"),
-    *("study", "dataset", "reproduce", "tracks", "servo"),
+    *("study", "dataset", "reproduce", "tracks", "servo", "fit"),
 )
 """Commands and groups in the order in which they are listed; what else there is comes last."""
 _HELP = {"-h", "--help", "--help-all", "--completion", "--complete"}

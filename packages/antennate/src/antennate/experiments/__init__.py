@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 GROUP = "antennate.experiments"
 """Group of the entry points."""
-LABORATORY = ("compete", "gait", "geometry", "dataset", "reproduce", "tracks", "servo")
+LABORATORY = ("compete", "gait", "geometry", "dataset", "reproduce", "tracks", "servo", "fit")
 """Experiments of the distribution `antennate-lab`, which may not be installed."""
 _NAME = re.compile(r"\w[\w-]*")
 FITTED = "fitted"
