@@ -1,4 +1,4 @@
-"""Write the tables of docs/results.md, docs/tracks.md and docs/fit.md; with --check only compare them.
+"""Write the tables of docs/results.md, tracks.md and fit.md; with --check only compare them.
 
 A table stands between `<!-- results of NAME -->` and `<!-- end -->`: the keys of result.json and
 the columns of trials.csv of an experiment, from the classes of its result and of its rows.

@@ -11,14 +11,17 @@ from typing import Any
 
 import numpy as np
 import pytest
+from protocol_logs import CONTROL, sweeps, write
 from pydantic import ValidationError
 from recorded import act, leaves, meet_ground, recorded
 from servo_recordings import of_twin
 
 from antennate import experiments
+from antennate.control.protocol import Protocol, Step
 from antennate.control.registry import BUILT_IN
 from antennate.experiments.force import experiment as force
 from antennate.experiments.force import physics as loads
+from antennate.robots.spec import RobotSpec
 from antennate_lab.reproduce import experiment as reproduce
 
 RECORDING = "time,counts,bend,trial,speed_m_s\n" + "".join(
@@ -269,6 +272,7 @@ TINY: dict[str, list[dict[str, Any]]] = {
             )
         ),
     ],
+    "fit": [{"log": ["small.mcap"], "robot": "small.toml", "robots": 20, "seed": 1}],
     "reproduce": [{"quick": True}],
 }
 PARTS = {"antenna": {}, "calibrate": {"rig": {"pushes": 2, "speeds": [0.3]}}}
@@ -293,6 +297,10 @@ def test_every_parameter_of_an_experiment_is_read_or_refused(
     Path("silent.json").write_text(told.replace("input_volts", "volts"))
     Path("tracks.csv").write_text(TRACKS)
     Path("rows.csv").write_text(ROWS)
+    Path("small.toml").write_text('links = 2\nmass = 0.8\nantennae.kind = "none"\n')
+    small = RobotSpec.named("small.toml")
+    steps = *sweeps(small, "leg_l0").steps, Step(maneuver="FORWARD", seconds=2.0)
+    write(Path("small.mcap"), small, Protocol(steps=steps).made_for(small, CONTROL))
     monkeypatch.setattr(reproduce, "QUICK", PARTS)
     for module in (loads, force):  # a bisection that is given no configuration, and takes long
         monkeypatch.setattr(module, "largest_force", lambda chain, limit: 0.05)

@@ -93,7 +93,7 @@ class Parameter:
     def value(self, searched: float) -> float:
         """The value at a place on the scale of the search; one that is nearly 0 is 0."""
         if self.scale.log:
-            return math.exp(searched)
+            return min(max(math.exp(searched), self.scale.low), self.scale.high)
         return float(searched) if searched > self.scale.nudge / 50.0 else 0.0
 
 

@@ -11,7 +11,7 @@ A second round draws about what the first has found.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -28,6 +28,8 @@ BINS = 10
 """Parts of a cycle over which what is felt is a mean."""
 WIDER = 2.0
 """A second round draws from a distribution so many times as wide as what the first has found."""
+POSTURE = 0.003
+"""Standard deviation of what the posture at the beginning of a walk is off [rad] (assumed)."""
 _RIDGES = 10.0 ** np.arange(-3.0, 3.0, 0.25)
 
 
@@ -69,12 +71,17 @@ def felt(robot: RobotSpec, course: Course) -> Floats:
     return np.nan_to_num(values[: count * width].reshape(count, width, -1).mean(axis=1).ravel())
 
 
-def _felt_of(robot: RobotSpec, courses: Sequence[Course]) -> Floats:
-    """What a simulated robot feels in all courses; NaN where the simulation fails."""
-    parts = []
+def _felt_of(robot: RobotSpec, courses: Sequence[Course], seed: int) -> Floats:
+    """What a simulated robot feels in all courses; NaN where the simulation fails.
+
+    Each walk begins a little off the posture that was measured, so that chance counts as noise.
+    """
+    rng, parts = np.random.default_rng(seed), []
     for course in courses:
+        off = POSTURE * rng.standard_normal(course.positions.shape[1])
+        begin = replace(course, positions=course.positions + off)
         try:
-            parts.append(felt(robot, simulated(robot, course)))
+            parts.append(felt(robot, simulated(robot, begin)))
         except SimulationError:
             parts.append(np.full_like(felt(robot, course), np.nan))
     return np.concatenate(parts)
@@ -92,7 +99,8 @@ def walked(
     robots: Sequence[RobotSpec], courses: Sequence[Course], workers: Workers, on_step: OnStep
 ) -> Floats:
     """What robots feel in all courses, shape (robots, F)."""
-    return np.array(gather(_felt_of, [(robot, courses) for robot in robots], workers, on_step))
+    tasks = [(robot, courses, seed) for seed, robot in enumerate(robots)]
+    return np.array(gather(_felt_of, tasks, workers, on_step))
 
 
 @dataclass(frozen=True)
