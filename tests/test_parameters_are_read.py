@@ -281,7 +281,7 @@ PARTS = {"antenna": {}, "calibrate": {"rig": {"pushes": 2, "speeds": [0.3]}}}
 
 MARKS = {
     **dict.fromkeys(("geometry", "climb", "dataset", "sweep"), pytest.mark.slow),
-    **dict.fromkeys(("compete", "tunnel"), pytest.mark.ci),
+    **dict.fromkeys(("compete", "tunnel", "fit"), pytest.mark.ci),
 }
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -120,12 +121,11 @@ def _common(logs: Floats) -> Floats:
 def correlations(found: Sequence[Estimate]) -> list[Correlation]:
     """Pairs of told parameters whose errors go together most."""
     pairs = []
-    for at, one in enumerate(found):
-        for other in found[at + 1 :]:
-            if one.told and other.told and one.by == other.by:
-                r = float(np.corrcoef(one.errors, other.errors)[0, 1])
-                pairs.append(
-                    Correlation(one=one.parameter.name, other=other.parameter.name, correlation=r)
-                )
+    told = [each for each in found if each.told and each.errors.std() > 0.0]
+    for one, other in itertools.combinations(told, 2):
+        if one.by == other.by:
+            names = {"one": one.parameter.name, "other": other.parameter.name}
+            r = float(np.corrcoef(one.errors, other.errors)[0, 1])
+            pairs.append(Correlation(**names, correlation=r))
     large = [pair for pair in pairs if abs(pair.correlation) >= _LEAST]
     return sorted(large, key=lambda pair: -abs(pair.correlation))[:_MOST]
