@@ -46,7 +46,7 @@ def _draw_walk(panel: Axes, outcome: FitOutcome) -> None:
     at = next((i for i, name in enumerate(names) if name in outcome.held), 0)
     _, course = outcome.courses[at]
     t = course.period * np.arange(len(course.commands))
-    three = ((course, style.INK, "measured"), (outcome.made[at][0], _BEFORE, "before"))
+    three = ((course, style.FAINT, "measured"), (outcome.made[at][0], _BEFORE, "before"))
     for each, colour, label in (*three, (outcome.made[at][1], _AFTER, "fitted")):
         joints = moving(course)
         turning = course.gyro.size > 0
@@ -55,7 +55,8 @@ def _draw_walk(panel: Axes, outcome: FitOutcome) -> None:
             if turning
             else np.degrees(each.positions - each.commands)[:, joints[:1]]
         )
-        panel.plot(t, values, color=colour, label=label, linewidth=1)
+        width = 3.0 if each is course else 1.0
+        panel.plot(t, values, color=colour, label=label, linewidth=width)
         panel.set_ylabel("turning of the head [rad/s]" if turning else "lag [deg]")
     panel.set_xlabel("time [s]")
     panel.set_title(course.name)
@@ -73,5 +74,8 @@ def _intervals(outcome: FitOutcome) -> Figure:
     panel.axvline(1.0, color=style.MUTED, linewidth=0.8, linestyle=":")
     panel.set_yticks(range(len(rows)), [row.name for row in reversed(rows)], fontsize=7)
     panel.set_xscale("log")
+    for axis in (panel.xaxis.set_major_formatter, panel.xaxis.set_minor_formatter):
+        axis("{x:g}")
+    panel.tick_params(axis="x", which="both", labelsize=7, rotation=45)
     panel.set_xlabel("over its value before")
     return figure
