@@ -83,7 +83,8 @@ def of_air(
         told = bool(swept[p] and sd[p] < TOLD * each.scale.spread)
         middle = solution.x[p] if told else problem.start[p]
         ends = np.clip(middle + LEVEL * np.array([-1.0, 1.0]) * sd[p], low[p], high[p])
-        interval = (each.value(ends[0]), each.value(ends[1]))
+        below, above = (np.exp(ends) if each.scale.log else ends).tolist()
+        interval = (below, above)
         if each.path.endswith("delay") and interval[0] <= SHORTEST:
             interval = (0.0, max(interval[1], SHORTEST))
         value = each.value(solution.x[p]) if told else each.start
