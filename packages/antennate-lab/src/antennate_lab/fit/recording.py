@@ -25,8 +25,8 @@ DRIFT = 0.003
 """A clock that runs fast or slow by more of its time is named (assumed: a crystal has 0.0001)."""
 FEWEST = 50
 """Fewest ticks of a step that can be compared."""
-_LOST = 0.05
-"""A step with a larger share of ticks without a measurement is left out."""
+_LOST = 0.2
+"""A step in which a joint lacks a larger share of its measurements is left out (assumed)."""
 _PARTS = ("links", "joint_names", "servo_names", "ids")
 """What a log and a robot's file must agree on."""
 
@@ -86,7 +86,10 @@ def read(path: Path, robot: RobotSpec) -> Recording:
         raise BadInputError(
             f"{path}: expected whole steps with measured positions, found none of {len(planned)}"
         )
-    warnings = _drift(list(ticks.values()), period)
+    within = [
+        [ticks[n] for n in range(step.begin, step.end) if n in ticks] for step in found.values()
+    ]
+    warnings = _drift(within, period)
     if missing:
         warnings.append(
             f"{len(missing)} of {len(planned)} steps of the protocol are missing, from "
@@ -133,9 +136,9 @@ def _course(
     commands = np.array([tick.angles for tick in ticks])
     if positions.ndim < 2 or not positions.shape[1]:
         return None, "no positions were measured"
-    known = np.isfinite(positions).all(axis=1) & np.isfinite(commands).all(axis=1)
-    if known.mean() < 1.0 - _LOST:
-        return None, f"positions are missing in {1.0 - known.mean():.0%} of its ticks"
+    known = float(np.isfinite(positions).mean(axis=0).min())
+    if known < 1.0 - _LOST or not np.isfinite(commands).all():
+        return None, f"positions of a joint are missing in {1.0 - known:.0%} of its ticks"
     grid = np.arange(round((now[-1] - now[0]) / period) + 1) * period + now[0]
     held = np.clip(np.searchsorted(now, grid + period / 2) - 1, 0, None)
     felt = [np.array([getattr(t, what) for t in ticks]) for what in ("angular_velocity", "reading")]
@@ -165,19 +168,23 @@ def _between(grid: Floats, now: Floats, values: Floats) -> Floats:
     return np.array(columns).T.reshape(len(grid), values.shape[1])
 
 
-def _drift(ticks: list[Tick], period: float) -> list[str]:
-    """What the clocks of a log say of one another."""
-    now, board = (np.array([getattr(tick, name) for tick in ticks]) for name in ("now", "t"))
-    known = np.isfinite(board)
+def _drift(steps_of: list[list[Tick]], period: float) -> list[str]:
+    """What the clocks say of one another, by their paces in the steps of a log."""
+    paces, lasting = [], []
+    for ticks in steps_of:
+        now, board = (np.array([getattr(tick, name) for tick in ticks]) for name in ("now", "t"))
+        known = np.isfinite(board)
+        lasting += np.diff(now).tolist()
+        if known.sum() > FEWEST:
+            paces.append(np.polyfit(now[known] - now[0], board[known] - board[known][0], 1)[0])
     told = []
-    if known.sum() > FEWEST and np.ptp(now[known]) > 0.0:
-        slope = float(np.polyfit(now[known] - now[0], board[known] - board[known][0], 1)[0])
-        if abs(slope - 1.0) > DRIFT:
-            told.append(
-                f"the clock of the antenna board runs {100 * (slope - 1.0):+.1f} % against that of "
-                "the loop: speeds and gyroscope are wrong by as much"
-            )
-    tick = float(np.median(np.diff(now)))
+    fast = float(np.median(paces)) - 1.0 if paces else 0.0
+    if abs(fast) > DRIFT:
+        told.append(
+            f"the clock of the antenna board runs {100 * fast:+.1f} % against that of the loop: "
+            "speeds and gyroscope are wrong by as much"
+        )
+    tick = float(np.median(lasting)) if lasting else period
     if abs(tick / period - 1.0) > DRIFT:
         told.append(
             f"a tick lasts {1e3 * tick:.3f} ms, the control period is {1e3 * period:g} ms: the "

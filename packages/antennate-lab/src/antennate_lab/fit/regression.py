@@ -30,6 +30,9 @@ WIDER = 2.0
 """A second round draws from a distribution so many times as wide as what the first has found."""
 POSTURE = 0.003
 """Standard deviation of what the posture at the beginning of a walk is off [rad] (assumed)."""
+_FARTHEST = 3.5
+"""A parameter is not told if the regression goes farther from what was known before [standard
+deviations]: no robot that was drawn felt the like."""
 _RIDGES = 10.0 ** np.arange(-3.0, 3.0, 0.25)
 
 
@@ -155,7 +158,8 @@ def regressed(
 
 def _corrected(told: Told, proposal: Known, prior: Known) -> Told:
     """What is known with the prior in place of the distribution that robots were drawn from."""
-    own, drawn_from, before = (sd**-2.0 for sd in (told.sd, proposal.sd, prior.sd))
+    sds = (np.maximum(told.sd, 1e-6), proposal.sd, prior.sd)
+    own, drawn_from, before = (sd**-2.0 for sd in sds)
     precision = np.maximum(own - drawn_from, 0.0) + before
     pull = np.maximum(own - drawn_from, 0.0)
     # what the data alone say: the regression without the distribution that it was drawn from
@@ -164,8 +168,10 @@ def _corrected(told: Told, proposal: Known, prior: Known) -> Told:
         (own * told.mean - drawn_from * proposal.mean) / np.where(pull > 0.0, pull, 1.0),
         prior.mean,
     )
-    mean = (pull * alone + before * prior.mean) / precision
-    return Told(mean, precision**-0.5, told.correlation)
+    mean, sd = (pull * alone + before * prior.mean) / precision, precision**-0.5
+    far = ~(abs(mean - prior.mean) < _FARTHEST * prior.sd)
+    correlation = np.where(far | far[:, None], np.eye(len(far)), told.correlation)
+    return Told(np.where(far, prior.mean, mean), np.where(far, prior.sd, sd), correlation)
 
 
 def search(
