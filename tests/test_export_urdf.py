@@ -85,7 +85,10 @@ def test_shapes_reach_as_far_as_those_of_the_simulator() -> None:
 
 @pytest.mark.parametrize("name", ROBOTS)
 def test_limits_are_those_of_data_sheet_and_description(name: str, tmp_path: Path) -> None:
-    """XC430-W240-T at 11.1 V: 1.7 N·m (e-Manual); XL330-M288-T at 5 V: 0.52 N·m."""
+    """XC430-W240-T at 11.1 V: 1.7 N·m (e-Manual); XL330-M288-T at 5 V: 0.52 N·m.
+
+    Rolling legs turn at 0.837 Hz, 5.26 rad/s, as docs/science/pace.md says.
+    """
     folder, robot = tmp_path / "export", RobotSpec.named(name)
     assert main(["robot", name, "--export", "urdf", "--out", str(folder)]) == 0
     root = ElementTree.parse(folder / "robot.urdf").getroot()
@@ -96,7 +99,7 @@ def test_limits_are_those_of_data_sheet_and_description(name: str, tmp_path: Pat
         assert joints[joint].get("type") == ("continuous" if rolls else "revolute")
         ends = {} if rolls else {"lower": -angle, "upper": angle}
         assert {k: limits[joint][k] for k in limits[joint].keys() & {"lower", "upper"}} == ends
-        assert limits[joint]["velocity"] == 4.5
+        assert limits[joint]["velocity"] == (5.26 if rolls else 4.5)
     if robot.antenna_count:
         assert limits["yaw1"]["effort"] == limits["leg_r3"]["effort"] == 1.7
         assert limits["antenna_r_base"]["effort"] == 0.52

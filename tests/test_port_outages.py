@@ -145,7 +145,7 @@ def test_B6_L12_a_bus_put_back_stands_until_an_arm_event_and_begins_where_the_se
     armed = next(i for i in story.during(AGAIN, 9) if story.state[i] < State.FAULT)
     assert story.t[armed] - AGAIN <= 1.0
     steps = abs(np.diff(story.goals[armed : armed + 50], axis=0))
-    assert steps.max() <= 30
+    assert steps.max() <= 35  # legs: 5.26 rad/s in 10 ms, in ticks of 2 pi / 4096
     servos = story.rig.robot.servos
     assert {s.get("bus_watchdog") for s in servos} == {5}
 
