@@ -22,7 +22,7 @@ from antennate.types import AntennaFrame, JointCommand, State
 from dynamixel_bus.servo_bus import Fault, Trouble
 
 LEGS = slice(5, 17)
-REACH = math.ceil(4.5 * 0.01 / (2 * math.pi / 4096))
+REACH = math.ceil(5.26 * 0.01 / (2 * math.pi / 4096))
 CONFIG = DriveConfig(dry_run=0.5, duration=4.0)
 
 
