@@ -84,6 +84,19 @@ class LogOptions(ResultOptions):
     overwrite: bool = option(False, "replace that file")
     video_view: FilmView = option("above", "from where `film` looks")
     json: bool = option(False, "print what `info` finds as JSON")
+    poses: Path | None = option(
+        None, "table of motion capture, CSV or TRC, that `plot` draws beside the log", "FILE"
+    )
+    markers: tuple[str, ...] = option(
+        (), "its markers at the rear of the head and in front, or one body", "NAME", ["--poses"]
+    )
+    unit: float | None = option(
+        None, "its unit of length [m], else as it says", "FLOAT", ["--poses"], gt=0, le=1000
+    )
+    up: Literal["x", "y", "z"] | None = option(
+        None, "its axis that points up, else found", needs=["--poses"]
+    )
+    mirrored: bool = option(False, "it is left-handed, or has y down as images", needs=["--poses"])
 
 
 def command(argv: Sequence[str]) -> int:
@@ -96,6 +109,8 @@ def command(argv: Sequence[str]) -> int:
     path = log_of(Path(options.log))
     if options.video_view != "above" and options.action != "film":
         raise ConfigError(f"--video-view: expected `film` beside it, found {options.action}")
+    if options.poses is not None and options.action != "plot":
+        raise ConfigError(f"--poses: expected `plot` beside it, found {options.action}")
     if options.action == "info":
         for flag, given in (("--out", options.out is not None), ("--overwrite", options.overwrite)):
             if given:
@@ -108,7 +123,7 @@ def command(argv: Sequence[str]) -> int:
     actions: Mapping[str, Callable[[Path, Path], LogReader]] = {
         "recover": _recover,
         "export": _export,
-        "plot": _plot,
+        "plot": _plot if options.poses is None else partial(_plot_poses, options=options),
         "film": partial(_film, view=options.video_view),
     }
     place = target.resolve()
@@ -128,6 +143,7 @@ def _target(path: Path, options: LogOptions) -> Path:
     """The file to write."""
     endings = _ENDINGS[options.action]
     stem = f"{path.stem}{RECOVERED}" if options.action == "recover" else path.stem
+    stem += "" if options.poses is None else "-poses"
     target = options.out or path.with_name(stem + endings[0])
     if target.suffix not in endings:
         raise ConfigError(f"--out: expected a name with {' or '.join(endings)}, found {target}")
@@ -184,6 +200,21 @@ def _plot(path: Path, target: Path) -> LogReader:
     log, figure = drawn(path)
     write_whole(target, render(figure)[target.suffix.removeprefix(".")], overwrite=True)
     return log
+
+
+def _plot_poses(path: Path, target: Path, options: LogOptions) -> LogReader:
+    from antennate.figures import render  # slow to import
+    from antennate.telemetry.figure import path_of
+    from antennate.telemetry.mocap import poses_of
+
+    table = options.poses or path
+    poses = poses_of(path, table, options.markers, options.unit, options.up, options.mirrored)
+    show_result({}, options, (), poses.sentence())
+    for warning in poses.warnings():
+        sys.stderr.write(f"antennate log: warning: {table}: {warning}\n")
+    figure = path_of(poses)
+    write_whole(target, render(figure)[target.suffix.removeprefix(".")], overwrite=True)
+    return poses.log.reader
 
 
 def _film(path: Path, target: Path, view: FilmView) -> LogReader:

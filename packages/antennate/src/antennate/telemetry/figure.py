@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from itertools import groupby, islice
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -17,6 +17,9 @@ from matplotlib.patches import Patch
 from antennate import figures as style
 from antennate.telemetry.reader import LogReader
 from antennate.types import Contact, Floats, Ints, Maneuver
+
+if TYPE_CHECKING:
+    from antennate.telemetry.mocap import Poses
 
 _MOST_DRAWN = 5000
 """Most ticks that a figure shows."""
@@ -152,6 +155,32 @@ def replay(course: Course) -> Figure:
     for panel, (_, draw) in zip(panels[:, 0], parts, strict=True):
         draw(panel, course)
     panels[-1, 0].set(xlabel="time of the loop [s]")
+    return figure
+
+
+@style.styled
+def path_of(poses: Poses) -> Figure:
+    """The path by motion capture, with the true one of a simulation, and yaw rates of both."""
+    from antennate.telemetry.mocap.clock import SPAN, turns  # slow to import
+
+    figure, true = style.canvas(style.WIDTH, 6.0), poses.beside()
+    path, rates = figure.subplots(2, 1, height_ratios=[2, 1])
+    measured, logged = style.series(1)[0], style.INK
+    if true is not None:
+        places = true.places
+        path.plot(places.real, places.imag, color=style.FAINT, linewidth=4, label="simulated")
+    path.plot(poses.x, poses.y, color=measured, linewidth=1, label="measured")
+    path.set(xlabel="x [m]", ylabel="y [m]", aspect="equal", title="Path")
+    path.legend(**_BESIDE_THE_TITLE)
+    t = np.linspace(poses.t[0], poses.t[-1], _MOST_DRAWN)
+    for course, name, colour in (
+        ((poses.log.t, poses.log.turned), poses.log.source, logged),
+        ((poses.t, poses.heading), "table", measured),
+    ):
+        rate = np.degrees(turns(course, t)) / SPAN
+        rates.plot(t, rate, color=colour, linewidth=0.8, label=name)
+    rates.set(xlabel="time of the loop [s]", ylabel="[°/s]", title="Yaw rate")
+    rates.legend(**_BESIDE_THE_TITLE)
     return figure
 
 

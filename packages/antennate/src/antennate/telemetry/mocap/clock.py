@@ -1,0 +1,179 @@
+"""The clock of a table against that of a log, by cross-correlation of yaw rates.
+
+A yaw rate is the turn of the head within `SPAN`. Those of table and log are compared at every lag
+and every drift up to `MOST_DRIFT`; the best is refined by robust least squares. Its interval is by
+blocks of the residual, which may be correlated in time (Liang and Zeger 1986, Biometrika 73:13).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from scipy import optimize, signal, stats
+
+from antennate.errors import BadInputError
+from antennate.types import Floats
+
+SPAN = 0.3
+"""Time over which a yaw rate is taken [s]: below half a cycle of the gait."""
+MOST_DRIFT = 0.02
+"""Largest drift of a clock that is looked for [1]."""
+_STEP, _FINE = 0.05, 0.02
+"""Steps of the search and of the fit [s]."""
+_SHIFT = 0.06
+"""What the next drift of the search moves the ends of the table by [s]."""
+_SHORTEST = 5.0
+"""Least time that both have in common [s]."""
+_APART = 0.5
+"""Lags farther apart than this are different ones [s]."""
+_WEAKEST, _CLEAR = 0.8, 3.0
+"""Least correlation of yaw rates, and how much more of their variance another lag leaves
+unexplained. Tables of other logs reach 2.2, those of their own log 6 and more by the joints."""
+_BLOCK, _FEWEST, _MOST = 2.0, 8, 60
+"""Length of a block of the residual [s], above a cycle of the gait, and how many there are."""
+
+Course = tuple[Floats, Floats]
+"""Times [s], rising, and unwrapped headings [rad], NaN in gaps, both of shape (n,)."""
+
+
+@dataclass(frozen=True)
+class Clock:
+    """The clock of a table: when it shows `centre` [s] the log has `at` [s].
+
+    Attributes:
+        drift: How much faster the time of the log passes than that of the table [1].
+        at_error: Half the 95 % interval of `at` [s].
+        drift_error: Half the 95 % interval of `drift` [1].
+        correlation: Of the yaw rates.
+        rival: Correlation at the best of other lags.
+    """
+
+    centre: float
+    at: float
+    drift: float
+    correlation: float
+    rival: float
+    at_error: float = math.nan
+    drift_error: float = math.nan
+
+    def in_log(self, t: Floats) -> Floats:
+        """Times of the table as times of the log [s]."""
+        return self.at + (1.0 + self.drift) * (t - self.centre)
+
+
+def turns(course: Course, at: Floats) -> Floats:
+    """Turn of a heading within `SPAN` around some times [rad], NaN where it is not known.
+
+    Args:
+        course: The heading over time.
+        at: Where to look [s], shape (m,).
+    """
+    begin, end = (np.interp(at + side * SPAN / 2, *course, np.nan, np.nan) for side in (-1, 1))
+    return end - begin
+
+
+def align(name: Path, table: Course, log: Course) -> Clock:
+    """The clock of a table.
+
+    Args:
+        name: The table, for messages.
+        table: Its headings over its own time.
+        log: How far the head had turned, over the time of the log.
+
+    Raises:
+        BadInputError: No lag fits, several do, or the table turns the other way.
+    """
+    first, last = table[0][np.isfinite(table[1])][[0, -1]].tolist()
+    centre, half = (first + last) / 2, (last - first) / 2
+    drifts = MOST_DRIFT * np.linspace(-1, 1, 2 * math.ceil(MOST_DRIFT * half / _SHIFT) + 1)
+    count = math.ceil((1 + MOST_DRIFT) * half / _STEP)
+    places = _STEP * np.arange(-count, count + 1)
+    grid = np.arange(log[0][0], log[0][-1] + _STEP, _STEP)
+    theirs = turns(log, grid)
+    lags = np.array(
+        [_correlations(turns(table, centre + places / (1 + drift)), theirs) for drift in drifts]
+    )
+    best, lag = np.unravel_index(np.argmax(abs(lags)), lags.shape)
+    others = abs(np.arange(lags.shape[1]) - lag) * _STEP > _APART
+    peak, rival = float(lags[best, lag]), float(abs(lags[:, others]).max(initial=0.0))
+    _judge(name, peak, rival)
+    at = float(grid[0] + (lag - count) * _STEP)
+    return _refined(table, log, Clock(centre, at, float(drifts[best]), peak, rival))
+
+
+def _correlations(ours: Floats, theirs: Floats) -> Floats:
+    """Correlation at every place of the middle of one series in another; NaN counts in neither."""
+
+    def sums(a: Floats, b: Floats) -> Floats:
+        return signal.correlate(b, a, "full", "fft")
+
+    a, b = (np.nan_to_num(values - np.nanmean(values)) for values in (ours, theirs))
+    sound, known = np.isfinite(ours).astype(float), np.isfinite(theirs).astype(float)
+    energy = np.maximum(sums(a * a, known), 1e-9) * np.maximum(sums(sound, b * b), 1e-9)
+    enough = sums(sound, known) * _STEP > _SHORTEST
+    return np.where(enough, sums(a, b) / np.sqrt(energy), 0.0)
+
+
+def _judge(name: Path, peak: float, rival: float) -> None:
+    """Refuse a table that fits nowhere, at several lags, or in a mirror."""
+    if abs(peak) < _WEAKEST or 1 - rival**2 < _CLEAR * (1 - peak**2):
+        raise BadInputError(
+            f"{name}: expected one lag at which it turns as the log does, found a correlation of "
+            f"{abs(peak):.2f} at best and {rival:.2f} at another lag: is it of another time, or is "
+            "another axis --up? A steady walk fits at any cycle: record turns, and its begin"
+        )
+    if peak < 0:
+        raise BadInputError(
+            f"{name}: expected headings that turn as the log does, found a correlation of "
+            f"{peak:.2f}: the table is left-handed, or two of its axes are exchanged; --mirrored"
+        )
+
+
+def _refined(table: Course, log: Course, clock: Clock) -> Clock:
+    """The clock by robust least squares, with its intervals."""
+    places = np.arange(table[0][0], table[0][-1], _FINE)
+    ours, theirs = turns(table, places), turns(log, clock.in_log(places))
+    sound = np.isfinite(ours) & np.isfinite(theirs)
+    centre = float(places[sound][[0, -1]].mean())
+    clock = replace(clock, centre=centre, at=clock.at + (1 + clock.drift) * (centre - clock.centre))
+    since, ours = places[sound] - centre, ours[sound]
+    half = float(since[-1])
+
+    def predicted(x: Floats, later: float = 0.0) -> Floats:
+        at = clock.at + x[0] + (1 + clock.drift + x[1] / half) * since + later
+        return np.nan_to_num(turns(log, at))
+
+    def residual(x: Floats) -> Floats:
+        return x[2] + x[3] * predicted(x) - ours
+
+    start = np.array([0.0, 0.0, 0.0, 1.0])
+    scale = 2.0 * float(np.median(abs(residual(start)))) + 1e-9
+    fit = optimize.least_squares(residual, start, loss="soft_l1", f_scale=scale)
+    slope = fit.x[3] * (predicted(fit.x, _FINE) - predicted(fit.x, -_FINE)) / (2 * _FINE)
+    jacobian = np.stack(
+        [slope, slope * since / half, np.ones(len(since)), predicted(fit.x)], axis=1
+    )
+    weights = 1 / np.sqrt(1 + (fit.fun / scale) ** 2)
+    errors = _half_intervals(jacobian, weights, fit.fun, since)
+    return replace(
+        clock,
+        at=clock.at + float(fit.x[0]),
+        drift=clock.drift + float(fit.x[1]) / half,
+        at_error=errors[0],
+        drift_error=errors[1] / half,
+    )
+
+
+def _half_intervals(jacobian: Floats, weights: Floats, residual: Floats, t: Floats) -> list[float]:
+    """Half the 95 % interval of each number of a fit, from the scores of blocks of time."""
+    count = int(np.clip(np.ptp(t) / _BLOCK, _FEWEST, _MOST))
+    block = np.minimum(count * (t - t[0]) / np.ptp(t), count - 1).astype(int)
+    scores = np.zeros((count, jacobian.shape[1]))
+    np.add.at(scores, block, jacobian * (weights * residual)[:, None])
+    inverse = np.linalg.inv((jacobian * weights[:, None]).T @ jacobian)
+    free = count - jacobian.shape[1]
+    covariance = inverse @ scores.T @ scores @ inverse * count / free
+    return (stats.t.ppf(0.975, free) * np.sqrt(np.diag(covariance))).tolist()
