@@ -152,7 +152,8 @@ def poses_of(
     head = head_of(table, t, columns, markers, up, mirrored)
     wide = np.flatnonzero(np.diff(t) > 3.5 * np.median(np.diff(t))) + 1
     t = np.insert(t, wide, (t[wide - 1] + t[wide]) / 2)
-    places, headings = (np.insert(v, wide, np.nan) for v in (head.places, head.headings))
+    places = np.insert(head.places, wide, complex(np.nan, np.nan))
+    headings = np.insert(head.headings, wide, np.nan)
     _require_walk(table, t, places, headings, said.reader.header.robot.length)
     clock = align(table, (t, headings), (said.t, said.turned))
     clock = replace(clock, at_error=math.hypot(clock.at_error, ERRORS[said.source]))

@@ -63,8 +63,8 @@ def head_of(
         headings = _heading(path, columns, names[0], up) * (-1 if mirrored else 1)
     else:
         stray = abs(abs(ahead) / np.nanmedian(abs(ahead)) - 1) > _STRAY
-        places[stray], strays, headings = np.nan, int(stray.sum()), np.angle(ahead)
-        headings[stray] = np.nan
+        strays, headings = int(stray.sum()), np.angle(ahead)
+        places[stray], headings[stray] = complex(np.nan, np.nan), np.nan
         exchanged = _turn_back(t, headings)
     known = np.isfinite(headings)
     if known.sum() < 2:

@@ -84,7 +84,7 @@ def _by_joints(path: Path, robot: RobotSpec, ticks: Sequence[Tick]) -> tuple[Flo
     """Times and turn by the yaw joints: the head turns against the mean of all links."""
     yaw = robot.places("yaw")
     told = [(tick.now, tick.positions[yaw]) for tick in ticks if tick.positions]
-    angles = np.array([angles for _, angles in told]).reshape(len(told), -1)
+    angles = np.array([angles for _, angles in told]).reshape(len(told), yaw.stop - yaw.start)
     known = np.isfinite(angles).all(axis=1)
     if not angles.size or not known.any():
         raise BadInputError(
