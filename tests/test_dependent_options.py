@@ -19,6 +19,8 @@ NEEDS = {
     "--gait": ["--export mjcf"],
     "--goals.release": ["--accept"],
     "--key": ["--udp"],
+    "--markers": ["--poses"],
+    "--mirrored": ["--poses"],
     "--overwrite": ["--out"],
     "--resume": ["--out"],
     "--retry": ["--out"],
@@ -28,6 +30,8 @@ NEEDS = {
     "--seed": ["--scene"],
     "--slurm": ["--engine slurm"],
     "--teleop.gamepad-silence": ["--gamepad"],
+    "--unit": ["--poses"],
+    "--up": ["--poses"],
     "--video-trial": ["--video"],
     "--video-view": ["--video"],
     "--view-paused": ["--view"],
@@ -78,9 +82,9 @@ def test_each_is_refused_alone(
 ) -> None:
     """With its own default, too: it was said, and nothing would come of it."""
     monkeypatch.chdir(tmp_path)
-    value = {"DOMAIN": "7", "TEXT": "x", "FILE": "x", "NAME=VALUE": "a=1"}.get(
-        option.metavar, option.default
-    )
+    known = {"DOMAIN": "7", "TEXT": "x", "FILE": "x", "NAME": "x", "NAME=VALUE": "a=1"}
+    default = option.default or next(iter(option.choices), "1")
+    value = known.get(option.metavar, default)
     words = [option.offered, *([value] if option.metavar else [])]
     err = refused(*name.split(), *words)
     needed = " or ".join(option.needs)

@@ -10,7 +10,7 @@ from typing import Literal
 import numpy as np
 
 from antennate.errors import BadInputError
-from antennate.telemetry.mocap.clock import Clock, align
+from antennate.telemetry.mocap.clock import Clock, align, with_gaps
 from antennate.telemetry.mocap.head import Complexes, Head, head_of
 from antennate.telemetry.mocap.recorded import ERRORS, Recorded, recorded
 from antennate.telemetry.mocap.tables import read
@@ -150,14 +150,11 @@ def poses_of(
     said = recorded(log)
     t, columns = read(table, unit)
     head = head_of(table, t, columns, markers, up, mirrored)
-    wide = np.flatnonzero(np.diff(t) > 3.5 * np.median(np.diff(t))) + 1
-    t = np.insert(t, wide, (t[wide - 1] + t[wide]) / 2)
-    places = np.insert(head.places, wide, complex(np.nan, np.nan))
-    headings = np.insert(head.headings, wide, np.nan)
-    _require_walk(table, t, places, headings, said.reader.header.robot.length)
+    t, x, y, headings = with_gaps(t, head.places.real, head.places.imag, head.headings)
+    _require_walk(table, t, x + 1j * y, headings, said.reader.header.robot.length)
     clock = align(table, (t, headings), (said.t, said.turned))
     clock = replace(clock, at_error=math.hypot(clock.at_error, ERRORS[said.source]))
-    return Poses(clock.in_log(t), places.real, places.imag, headings, clock, head, said)
+    return Poses(clock.in_log(t), x, y, headings, clock, head, said)
 
 
 def _require_walk(path: Path, t: Floats, places: Complexes, headings: Floats, size: float) -> None:

@@ -22,6 +22,8 @@ SPAN = 0.3
 """Time over which a yaw rate is taken [s]: below half a cycle of the gait."""
 MOST_DRIFT = 0.02
 """Largest drift of a clock that is looked for [1]."""
+_GAP = 3.5
+"""Steps of time that make a gap [median steps]."""
 _STEP, _FINE = 0.05, 0.02
 """Steps of the search and of the fit [s]."""
 _SHIFT = 0.06
@@ -74,6 +76,14 @@ def turns(course: Course, at: Floats) -> Floats:
     """
     begin, end = (np.interp(at + side * SPAN / 2, *course, np.nan, np.nan) for side in (-1, 1))
     return end - begin
+
+
+def with_gaps(t: Floats, *values: Floats) -> tuple[Floats, ...]:
+    """Times and values, each of shape (n,), with a row of NaN in each gap of the times."""
+    step = np.diff(t)
+    wide = np.flatnonzero(step > _GAP * np.median(step)) + 1
+    times = np.insert(t, wide, t[wide] - step[wide - 1] / 2)
+    return times, *(np.insert(each, wide, np.nan) for each in values)
 
 
 def align(name: Path, table: Course, log: Course) -> Clock:

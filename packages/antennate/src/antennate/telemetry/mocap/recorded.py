@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import accumulate
 from pathlib import Path
 
 import numpy as np
 
 from antennate.errors import BadInputError
-from antennate.robots.spec import RobotSpec
+from antennate.telemetry.mocap.clock import with_gaps
 from antennate.telemetry.reader import LogReader
-from antennate.telemetry.ticks import Tick
 from antennate.telemetry.topics import COORDINATES
 from antennate.types import Floats
 
@@ -30,7 +29,8 @@ class Recorded:
         reader: The log as it was read.
         source: `GYRO`, or `JOINTS` where there is no inertial sensor.
         t: Times [s], shape (n,).
-        turned: How far the head had turned since the first of them [rad], shape (n,).
+        turned: How far the head had turned [rad], by the joints against the mean of all links, NaN
+            in gaps, shape (n,).
         truth: In a simulation times [s], x, y [m] and heading [rad] of the head, shape (m, 4), 0
             rows else.
     """
@@ -50,11 +50,14 @@ def recorded(path: Path) -> Recorded:
         LogError: The log cannot be read.
     """
     with LogReader(path) as log:
-        robot, ticks, truth = log.header.robot, list[Tick](), list[list[float]]()
+        yaw, rows, truth = log.header.robot.places("yaw"), list[list[float]](), list[list[float]]()
+        links = yaw.stop - yaw.start + 1
         for records, tick in log.groups():
             if tick is None:
                 continue
-            ticks.append(tick)
+            behind = sum(accumulate(tick.positions[yaw])) / links if tick.positions else math.nan
+            rate = tick.angular_velocity[2] if tick.angular_velocity else math.nan
+            rows.append([tick.now, tick.age, rate, behind])
             for record in records:
                 if record.topic is COORDINATES:
                     state = COORDINATES.decode(record.data)
@@ -63,33 +66,21 @@ def recorded(path: Path) -> Recorded:
         log.require_ticks()
     course = np.array(truth).reshape(-1, 4)
     course[:, 3] = np.unwrap(course[:, 3])
-    gyro = robot.has_imu and any(tick.angular_velocity for tick in ticks)
-    t, turned = _by_gyro(ticks) if gyro else _by_joints(path, robot, ticks)
-    return Recorded(log, GYRO if gyro else JOINTS, t, turned, course)
-
-
-def _by_gyro(ticks: Sequence[Tick]) -> tuple[Floats, Floats]:
-    """Times and turn by the gyroscope: a sample is the mean rate since the one before."""
-    felt = [
-        tick for tick in ticks if tick.angular_velocity and math.isfinite(tick.angular_velocity[2])
-    ]
-    late = np.nan_to_num([tick.age for tick in felt])
-    t = np.array([tick.now for tick in felt]) - late
-    new = np.diff(t, prepend=-np.inf) > 0
-    t, rate = t[new], np.array([tick.angular_velocity[2] for tick in felt])[new]
-    return t, np.concatenate([[0.0], np.cumsum(rate[1:] * np.diff(t))])
-
-
-def _by_joints(path: Path, robot: RobotSpec, ticks: Sequence[Tick]) -> tuple[Floats, Floats]:
-    """Times and turn by the yaw joints: the head turns against the mean of all links."""
-    yaw = robot.places("yaw")
-    told = [(tick.now, tick.positions[yaw]) for tick in ticks if tick.positions]
-    angles = np.array([angles for _, angles in told]).reshape(len(told), yaw.stop - yaw.start)
-    known = np.isfinite(angles).all(axis=1)
-    if not angles.size or not known.any():
+    t, late, rate, behind = np.array(rows).T
+    source = GYRO if np.isfinite(rate).any() else JOINTS
+    t, turned = _by_gyro(t - np.nan_to_num(late), rate) if source == GYRO else (t, -behind)
+    known = np.isfinite(turned)
+    if links < 2 or not known.any():
         raise BadInputError(
             f"{path}: expected an inertial sensor, or measured yaw joints, found neither: nothing "
             "tells how the head turned"
         )
-    behind = np.cumsum(angles[known], axis=1).sum(axis=1) / (yaw.stop - yaw.start + 1)
-    return np.array([t for t, _ in told])[known], -behind
+    t, turned = with_gaps(t[known], turned[known])
+    return Recorded(log, source, t, turned, course)
+
+
+def _by_gyro(t: Floats, rate: Floats) -> tuple[Floats, Floats]:
+    """Times and turn by the gyroscope: a sample is the mean rate since the one before."""
+    new = np.isfinite(rate) & (np.diff(t, prepend=-np.inf) > 0)
+    t, rate = t[new], rate[new]
+    return t, np.concatenate([[0.0], np.cumsum(rate[1:] * np.diff(t))])
