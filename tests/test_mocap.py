@@ -110,7 +110,7 @@ def test_offset_and_drift_are_within_their_intervals(drift: float) -> None:
         rear, front = markers(SPAN, seed)
         heading = np.unwrap(np.arctan2(*(front - rear)[:, 1::-1].T))
         table = their_time(SPAN, 1000.0, drift), heading
-        clock = align(Path("table"), table, (times, circle(times)[2]))
+        clock = align(Path("table"), table, (times, circle(times)[2]), 0.9)
         true = (1 + drift) * (clock.centre - 1000.0)
         within += (
             abs(clock.at - true) < clock.at_error,

@@ -12,7 +12,7 @@ import numpy as np
 from antennate.errors import BadInputError
 from antennate.telemetry.mocap.clock import Clock, align, with_gaps
 from antennate.telemetry.mocap.head import Complexes, Head, head_of
-from antennate.telemetry.mocap.recorded import ERRORS, Recorded, recorded
+from antennate.telemetry.mocap.recorded import ERRORS, WEAKEST, Recorded, recorded
 from antennate.telemetry.mocap.tables import read
 from antennate.types import Floats
 
@@ -152,7 +152,7 @@ def poses_of(
     head = head_of(table, t, columns, markers, up, mirrored)
     t, x, y, headings = with_gaps(t, head.places.real, head.places.imag, head.headings)
     _require_walk(table, t, x + 1j * y, headings, said.reader.header.robot.length)
-    clock = align(table, (t, headings), (said.t, said.turned))
+    clock = align(table, (t, headings), (said.t, said.turned), WEAKEST[said.source])
     clock = replace(clock, at_error=math.hypot(clock.at_error, ERRORS[said.source]))
     return Poses(clock.in_log(t), x, y, headings, clock, head, said)
 

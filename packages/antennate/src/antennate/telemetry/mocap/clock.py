@@ -24,17 +24,16 @@ MOST_DRIFT = 0.02
 """Largest drift of a clock that is looked for [1]."""
 _GAP = 3.5
 """Steps of time that make a gap [median steps]."""
-_STEP, _FINE = 0.05, 0.02
+_STEP, _FINE = 0.025, 0.02
 """Steps of the search and of the fit [s]."""
-_SHIFT = 0.06
+_SHIFT = 0.03
 """What the next drift of the search moves the ends of the table by [s]."""
-_SHORTEST = 5.0
-"""Least time that both have in common [s]."""
+_SHORTEST, _LEAST = 5.0, 0.5
+"""Least time that both have in common [s], and its share of the shorter one."""
 _APART = 0.5
 """Lags farther apart than this are different ones [s]."""
-_WEAKEST, _CLEAR = 0.8, 3.0
-"""Least correlation of yaw rates, and how much more of their variance another lag leaves
-unexplained. Tables of other logs reach 2.2, those of their own log 6 and more by the joints."""
+_CLEAR = 4.0
+"""How much more of the variance of the yaw rates another lag leaves unexplained than the best."""
 _BLOCK, _FEWEST, _MOST = 2.0, 8, 60
 """Length of a block of the residual [s], above a cycle of the gait, and how many there are."""
 
@@ -86,13 +85,14 @@ def with_gaps(t: Floats, *values: Floats) -> tuple[Floats, ...]:
     return times, *(np.insert(each, wide, np.nan) for each in values)
 
 
-def align(name: Path, table: Course, log: Course) -> Clock:
+def align(name: Path, table: Course, log: Course, weakest: float) -> Clock:
     """The clock of a table.
 
     Args:
         name: The table, for messages.
         table: Its headings over its own time.
         log: How far the head had turned, over the time of the log.
+        weakest: Correlation of yaw rates that tables of other logs do not reach.
 
     Raises:
         BadInputError: No lag fits, several do, or the table turns the other way.
@@ -104,15 +104,17 @@ def align(name: Path, table: Course, log: Course) -> Clock:
     places = _STEP * np.arange(-count, count + 1)
     grid = np.arange(log[0][0], log[0][-1] + _STEP, _STEP)
     theirs = turns(log, grid)
-    lags = np.array(
-        [_correlations(turns(table, centre + places / (1 + drift)), theirs) for drift in drifts]
-    )
-    best, lag = np.unravel_index(np.argmax(abs(lags)), lags.shape)
-    others = abs(np.arange(lags.shape[1]) - lag) * _STEP > _APART
-    peak, rival = float(lags[best, lag]), float(abs(lags[:, others]).max(initial=0.0))
-    _judge(name, peak, rival)
+    lags, at_drift = np.zeros(len(grid) + 2 * count), np.zeros(len(grid) + 2 * count)
+    for drift in drifts.tolist():
+        found = _correlations(turns(table, centre + places / (1 + drift)), theirs)
+        better = abs(found) > abs(lags)
+        lags[better], at_drift[better] = found[better], drift
+    lag = int(np.argmax(abs(lags)))
+    others = abs(np.arange(len(lags)) - lag) * _STEP > _APART
+    peak, rival = float(lags[lag]), float(abs(lags[others]).max(initial=0.0))
+    _judge(name, peak, rival, weakest)
     at = float(grid[0] + (lag - count) * _STEP)
-    return _refined(table, log, Clock(centre, at, float(drifts[best]), peak, rival))
+    return _refined(table, log, Clock(centre, at, float(at_drift[lag]), peak, rival))
 
 
 def _correlations(ours: Floats, theirs: Floats) -> Floats:
@@ -124,13 +126,14 @@ def _correlations(ours: Floats, theirs: Floats) -> Floats:
     a, b = (np.nan_to_num(values - np.nanmean(values)) for values in (ours, theirs))
     sound, known = np.isfinite(ours).astype(float), np.isfinite(theirs).astype(float)
     energy = np.maximum(sums(a * a, known), 1e-9) * np.maximum(sums(sound, b * b), 1e-9)
-    enough = sums(sound, known) * _STEP > _SHORTEST
+    common = sums(sound, known)
+    enough = common > max(_SHORTEST / _STEP, _LEAST * min(sound.sum(), known.sum()))
     return np.where(enough, sums(a, b) / np.sqrt(energy), 0.0)
 
 
-def _judge(name: Path, peak: float, rival: float) -> None:
+def _judge(name: Path, peak: float, rival: float, weakest: float) -> None:
     """Refuse a table that fits nowhere, at several lags, or in a mirror."""
-    if abs(peak) < _WEAKEST or 1 - rival**2 < _CLEAR * (1 - peak**2):
+    if abs(peak) < weakest or 1 - rival**2 < _CLEAR * (1 - peak**2):
         raise BadInputError(
             f"{name}: expected one lag at which it turns as the log does, found a correlation of "
             f"{abs(peak):.2f} at best and {rival:.2f} at another lag: is it of another time, or is "
@@ -172,6 +175,7 @@ def _refined(table: Course, log: Course, clock: Clock) -> Clock:
         clock,
         at=clock.at + float(fit.x[0]),
         drift=clock.drift + float(fit.x[1]) / half,
+        correlation=float(np.corrcoef(predicted(fit.x), ours)[0, 1]),
         at_error=float(at_error),
         drift_error=float(drift_error) / half,
     )
