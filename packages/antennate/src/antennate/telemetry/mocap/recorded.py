@@ -19,7 +19,7 @@ GYRO, JOINTS = "gyro", "joints"
 """Where the yaw rate of a log comes from."""
 ERRORS, WEAKEST = {GYRO: 0.001, JOINTS: 0.02}, {GYRO: 0.97, JOINTS: 0.85}
 """What each adds to the error of a clock [s], and the correlation of yaw rates that tables of other
-logs do not reach: by 41 simulated logs, with their own tables and those of others."""
+logs do not reach: by 42 simulated logs, with their own tables and those of others."""
 
 
 @dataclass(frozen=True)
