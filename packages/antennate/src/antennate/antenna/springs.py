@@ -199,7 +199,9 @@ class Winding:
         return self.coil / self.wire
 
 
-def windings(params: SpringParams, wanted: tuple[float, ...]) -> list[Winding]:
+def windings(
+    params: SpringParams, wanted: tuple[float, ...], coils: tuple[float, ...] | None = None
+) -> list[Winding]:
     """Sets of springs from stock wire that come near the wanted stiffnesses [N·m/rad].
 
     Every stock wire is tried on every mandrel within the index limits, with coils rounded to what
@@ -209,13 +211,14 @@ def windings(params: SpringParams, wanted: tuple[float, ...]) -> list[Winding]:
     Args:
         params: Kind of wire, limits and steps.
         wanted: Stiffness of each spring [N·m/rad], shape (n,).
+        coils: Active coils that each has, shape (n,); those nearest to what is wanted if absent.
 
     Returns:
         Of each wire diameter the set with the smallest error, the smallest error first.
     """
     best: dict[float, Winding] = {}
     for wire, coil in _stock(params):
-        found = _wind(params, wire, coil, wanted)
+        found = _wind(params, wire, coil, wanted, coils)
         if found is None or found.yield_angle < math.radians(params.angle_deg):
             continue
         if wire not in best or found.error < best[wire].error:
@@ -239,11 +242,15 @@ def _stock(params: SpringParams) -> Iterator[tuple[float, float]]:
 
 
 def _wind(
-    params: SpringParams, wire: float, coil: float, wanted: tuple[float, ...]
+    params: SpringParams,
+    wire: float,
+    coil: float,
+    wanted: tuple[float, ...],
+    given: tuple[float, ...] | None,
 ) -> Winding | None:
     modulus, step = modulus_of(params), params.coil_step
     one = _stiffness(modulus, wire, coil, 1.0)
-    coils = tuple(max(1, round(one / k / step)) * step for k in wanted)
+    coils = given or tuple(max(1, round(one / k / step)) * step for k in wanted)
     low, high = params.coil_limits
     if min(coils) < low or max(coils) > high:
         return None

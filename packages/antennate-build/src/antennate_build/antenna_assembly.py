@@ -1,0 +1,150 @@
+"""An antenna put together: where each part stands at some angles of its hinges."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal
+
+from antennate_build import antenna_parts, kernel
+from antennate_build.kernel import Point, Solid
+from antennate_build.layout import AntennaLayout
+from antennate_build.mounts import Mount
+
+Kind = Literal["printed", "bought"]
+
+
+@dataclass(frozen=True)
+class Placed:
+    """A part at its place.
+
+    Attributes:
+        name: Its name, with a number where there are several.
+        part: The part that it is one of.
+        solid: The solid, in the frame of the assembly.
+        kind: Whether it is printed.
+    """
+
+    name: str
+    part: str
+    solid: Solid
+    kind: Kind
+
+
+@dataclass(frozen=True)
+class AntennaSolids:
+    """The parts of an antenna, each in its own frame, and how they go together.
+
+    Attributes:
+        layout: Sizes.
+        mount: The servo of its base.
+        roll: Turn of the plane in which it bends [rad].
+        sides: Names of the brackets and whether each is that of the right antenna.
+    """
+
+    layout: AntennaLayout
+    mount: Mount
+    roll: float = 0.0
+    sides: tuple[tuple[str, bool], ...] = (("bracket", False),)
+
+    @property
+    def hinges(self) -> int:
+        """Number of hinges."""
+        return self.layout.antenna.hinges
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """Part of each segment: segments alike have one name, after the first of them."""
+        names: dict[tuple[object, ...], str] = {}
+        found = []
+        for n in range(self.hinges):
+            springs = self.layout.springs[n : n + 2]
+            key = (*(s.turns for s in springs), len(springs), n < self.layout.sensed)
+            found.append(names.setdefault(key, f"segment_{n + 1}"))
+        return tuple(found)
+
+    @cached_property
+    def printed(self) -> dict[str, Solid]:
+        """Printed parts by name."""
+        parts = {
+            name: antenna_parts.bracket(self.layout, self.mount, self.roll, right)
+            for name, right in self.sides
+        }
+        for n, name in enumerate(self.names):
+            if name not in parts:
+                parts[name] = antenna_parts.segment(self.layout, n)
+        return parts | {
+            "pin": antenna_parts.pin(self.layout),
+            "cover": antenna_parts.cover(self.layout),
+        }
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """How many of each printed part one antenna takes; of the brackets one in all."""
+        counts = dict.fromkeys((name for name, _ in self.sides), 1)
+        for name in self.names:
+            counts[name] = counts.get(name, 0) + 1
+        return counts | {"pin": self.hinges, "cover": self.layout.sensed + 1}
+
+    @cached_property
+    def springs(self) -> tuple[Solid, ...]:
+        """Springs, base to tip, each about its hinge."""
+        made: dict[float, Solid] = {}
+        for n, spring in enumerate(self.layout.springs):
+            if spring.turns not in made:
+                made[spring.turns] = antenna_parts.spring(self.layout, n)
+        return tuple(made[spring.turns] for spring in self.layout.springs)
+
+    def placed(self, angles: Sequence[float] = (), springs: bool = True) -> list[Placed]:
+        """All parts, hinge by hinge from the base, in the frame of the first hinge.
+
+        Args:
+            angles: Angle of each hinge [rad]; straight if not given.
+            springs: Whether the springs are among them, as they are at rest.
+        """
+        angles = tuple(angles) or (0.0,) * self.hinges
+        bracket = self.sides[0][0]
+        parts = [Placed(bracket, bracket, self.printed[bracket], "printed")]
+        middle = antenna_parts.posts_of_bracket(self.layout, self.mount)
+        parts.append(self._cover(1, (sum(middle) / 2.0, 0.0, 0.0), (0.0, 0.0), 0.0))
+        at, heading = (0.0, 0.0), 0.0
+        for n, name in enumerate(self.names):
+            if springs:
+                parts.append(self._put(f"spring_{n + 1}", "spring", self.springs[n], at, heading))
+            parts.append(self._put(f"pin_{n + 1}", "pin", self.printed["pin"], at, heading))
+            heading += angles[n]
+            parts.append(self._put(f"segment_{n + 1}", name, self.printed[name], at, heading))
+            if n < self.layout.sensed:
+                place = (self.layout.length / 2.0, 0.0, 0.0)
+                parts.append(self._cover(n + 2, place, at, heading))
+            at = (
+                at[0] + self.layout.length * math.cos(heading),
+                at[1] + self.layout.length * math.sin(heading),
+            )
+        return parts
+
+    def _cover(self, number: int, place: Point, at: tuple[float, float], heading: float) -> Placed:
+        solid = kernel.moved(self.printed["cover"], place)
+        return self._put(f"cover_{number}", "cover", solid, at, heading)
+
+    def _put(
+        self, name: str, part: str, solid: Solid, at: tuple[float, float], heading: float
+    ) -> Placed:
+        put = kernel.moved(kernel.turned(solid, heading) if heading else solid, (*at, 0.0))
+        return Placed(name, part, put, "bought" if part == "spring" else "printed")
+
+    def turned_over(self, parts: Sequence[Placed]) -> list[Placed]:
+        """Parts as the antenna stands, with the servo's shaft upright, turned by its roll."""
+        return [
+            Placed(p.name, p.part, kernel.turned(p.solid, self.roll, "x"), p.kind)
+            if not p.part.startswith("bracket")
+            else p
+            for p in parts
+        ]
+
+
+def masses(solids: Mapping[str, Solid], density: float) -> dict[str, float]:
+    """Mass of parts by name [g]."""
+    return {name: density * kernel.volume(solid) for name, solid in solids.items()}

@@ -1,0 +1,152 @@
+"""A part as small cubes, layer by layer as it is printed: how thin its walls are, what overhangs.
+
+The mesh stands upright on the bed at z = 0. Cubes along a vertical line lie inside between every
+second crossing of the line with the mesh.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import ndimage
+
+from antennate.types import Bools, Floats
+from antennate_build.kernel import Mesh
+
+LONGEST_BRIDGE = 10.0
+"""Longest gap that is bridged in the air [mm] (assumed: what printers of plastic wire manage)."""
+_LEDGE = 0.6
+"""Farthest that something may stand out over nothing [mm] (assumed: a line and a half)."""
+_SPECKLE = 0.5
+"""Area of overhang below which nothing is told [mm²]: steps of slopes as cubes."""
+
+
+@dataclass(frozen=True)
+class Voxels:
+    """Cubes of a part.
+
+    Attributes:
+        inside: Which cubes are inside, shape (x, y, z), with a rim of empty ones.
+        size: Edge of a cube [mm].
+        origin: Middle of the first cube [mm], shape (3,).
+    """
+
+    inside: Bools
+    size: float
+    origin: Floats
+
+
+def voxels(mesh: Mesh, size: float) -> Voxels:
+    """The cubes of a mesh whose surface is closed."""
+    low, high = mesh.points.min(axis=0), mesh.points.max(axis=0)
+    origin = low - 1.5 * size + np.array([1.3e-4, 2.1e-4, 1.7e-4])  # off faces and edges
+    shape = np.ceil((high - origin) / size).astype(int) + 3
+    flips = np.zeros(shape, bool)
+    corners = (mesh.points[mesh.triangles] - origin) / size
+    for triangle in corners:
+        _mark(flips, triangle)
+    return Voxels(np.logical_xor.accumulate(flips, axis=2), size, origin)
+
+
+def _mark(flips: Bools, triangle: Floats) -> None:
+    """Flip the first cube above a triangle on each vertical line that it crosses."""
+    (ax, ay, az), (bx, by, bz), (cx, cy, cz) = triangle
+    area = (bx - ax) * (cy - ay) - (cx - ax) * (by - ay)
+    if area == 0.0:
+        return
+    i0, j0 = (int(np.ceil(min(v))) for v in ((ax, bx, cx), (ay, by, cy)))
+    i1, j1 = (int(np.floor(max(v))) for v in ((ax, bx, cx), (ay, by, cy)))
+    if i1 < i0 or j1 < j0:
+        return
+    x, y = np.arange(i0, i1 + 1)[:, None], np.arange(j0, j1 + 1)[None, :]
+    b = ((x - ax) * (cy - ay) - (cx - ax) * (y - ay)) / area
+    c = ((bx - ax) * (y - ay) - (x - ax) * (by - ay)) / area
+    within = (b >= 0) & (c >= 0) & (b + c <= 1)
+    i, j = np.nonzero(within)
+    z = az + b[i, j] * (bz - az) + c[i, j] * (cz - az)
+    np.logical_xor.at(flips, (i + i0, j + j0, np.ceil(z).astype(int)), True)
+
+
+def thinnest(part: Voxels, most: float) -> tuple[float, Floats]:
+    """Thinnest wall [mm] in steps of two cubes, at most `most`, and a place in it, shape (3,).
+
+    A wall is as thick as the largest ball that reaches it. Edges, which no ball fills, are no
+    walls: what is left of them lies within half a radius of a ball.
+    """
+    depth = ndimage.distance_transform_edt(part.inside) * part.size
+    thickness, place = 2.0 * part.size, np.full(3, np.nan)
+    while thickness < most - 1e-9:
+        radius = (thickness + 2.0 * part.size) / 2.0
+        core = depth >= radius - 0.5 * part.size - 1e-9
+        far = ndimage.distance_transform_edt(~core) * part.size
+        far[~part.inside] = 0.0
+        if far.max() > 1.6 * radius:
+            where = np.unravel_index(int(far.argmax()), far.shape)
+            place = part.origin + part.size * np.array(where)
+            break
+        thickness += 2.0 * part.size
+    return min(thickness, most), place
+
+
+@dataclass(frozen=True)
+class Overhang:
+    """Something that is printed over nothing.
+
+    Attributes:
+        height: Over the bed [mm].
+        area: [mm²].
+        reach: Farthest from what carries it [mm].
+    """
+
+    height: float
+    area: float
+    reach: float
+
+
+def overhangs(part: Voxels) -> list[Overhang]:
+    """What needs support: steeper than 45°, neither a short ledge nor a bridge."""
+    found = []
+    inside, size = part.inside, part.size
+    layers = np.flatnonzero(inside.any(axis=(0, 1)))
+    around = np.ones((3, 3), bool)
+    for k in layers[1:]:
+        below = ndimage.binary_dilation(inside[:, :, k - 1], around)
+        free = inside[:, :, k] & ~below
+        if free.sum() * size**2 < _SPECKLE:
+            continue
+        labels, count = ndimage.label(free, around)
+        for n in range(1, count + 1):
+            spot = labels == n
+            if (told := _overhang(spot, below & inside[:, :, k], size, (k - layers[0]) * size)):
+                found.append(told)
+    return found
+
+
+def _overhang(spot: Bools, held: Bools, size: float, height: float) -> Overhang | None:
+    area = float(spot.sum()) * size**2
+    if area < _SPECKLE:
+        return None
+    if not held.any():
+        return Overhang(height, area, float("inf"))
+    reach = float(ndimage.distance_transform_edt(~held)[spot].max()) * size
+    if reach <= _LEDGE or _is_bridge(spot, held, reach, size):
+        return None
+    return Overhang(height, area, reach)
+
+
+def _is_bridge(spot: Bools, held: Bools, reach: float, size: float) -> bool:
+    """Whether what is free is carried on both sides, and short enough."""
+    if 2.0 * reach > LONGEST_BRIDGE:
+        return False
+    rim = ndimage.binary_dilation(spot, np.ones((3, 3), bool)) & held
+    places = np.argwhere(rim)
+    middle, ends = np.argwhere(spot).mean(axis=0), places - np.argwhere(spot).mean(axis=0)
+    if not len(places) or not np.isfinite(middle).all():
+        return False
+    opposite = -ends
+    # each side of the rim has a counterpart across the middle
+    ways = [ends @ way for way in (np.array([1.0, 0.0]), np.array([0.0, 1.0]))]
+    return len(opposite) > 1 and any(
+        w.max() * size >= 0.6 * reach and -w.min() * size >= 0.6 * reach for w in ways
+    )
