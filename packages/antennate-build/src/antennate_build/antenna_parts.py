@@ -20,9 +20,9 @@ PIN_HEAD = 1.2
 """Thickness of a pin's head [mm]."""
 PRESS = 0.05
 """Hole of the outer arms over the pin [mm]: it sits there, and turns in the inner arms."""
-FLANGE = 2.4
-"""Thickness of the bracket's flange on the horn [mm]: a screw M2 x 5 then bites 2.6 mm."""
-SCREW_LENGTH = 5.0
+FLANGE = 2.0
+"""Thickness of the bracket's flange on the horn [mm]: a screw M2 x 4 then bites 2 mm."""
+SCREW_LENGTH = 4.0
 """Length of the screws of the flange [mm]."""
 _HEAD_ROOM = 0.6
 """Between heads of screws and what turns above them [mm]."""
@@ -87,7 +87,7 @@ def _windows(layout: AntennaLayout, end: float) -> list[Solid]:
     width = (last - first + wall) / count - wall
     if width < wall:
         return []
-    tall = (layout.low + wall, layout.high - wall)
+    tall = (layout.low + wall, _post_foot(layout))
     starts = [first + n * (width + wall) for n in range(count)]
     return [kernel.block((x, x + width), tall, (-99, 99)) for x in starts]
 
@@ -168,11 +168,18 @@ def _neck(layout: AntennaLayout, z: tuple[float, float], near: bool) -> Solid:
 def _posts(layout: AntennaLayout) -> list[Solid]:
     """Posts at the middle that hold the sensor and its cover."""
     middle, half = layout.length / 2.0, layout.strip.length / 2.0
-    return posts(layout, (middle - half, middle + half), layout.high - layout.print.wall_mm)
+    return posts(layout, (middle - half, middle + half), _post_foot(layout))
+
+
+def _post_foot(layout: AntennaLayout) -> float:
+    """Where posts stand along y: so low that they are a wall thick below the groove."""
+    strip, wall = layout.strip, layout.print.wall_mm
+    inward = max(layout.hinge.gap - strip.half, 0.0)
+    return min(layout.high - wall, strip.roof - layout.print.play_mm - wall - inward)
 
 
 def posts(layout: AntennaLayout, x: tuple[float, float], low: float) -> list[Solid]:
-    """Two posts with a ledge below the sensor and a groove for the foot of the cover.
+    """Two posts beside the sensor with a groove for the cover; the sensor lies on the arms.
 
     Args:
         layout: Sizes.
@@ -180,13 +187,11 @@ def posts(layout: AntennaLayout, x: tuple[float, float], low: float) -> list[Sol
         low: Where they stand along y.
     """
     hinge, strip, play = layout.hinge, layout.strip, layout.print.play_mm
-    wall, foot = layout.print.wall_mm, strip.half + strip.lip
-    ledge = min(max(strip.half - 0.6, hinge.gap - (strip.floor - low)), hinge.gap)
-    lip = strip.top - wall
-    half = [(ledge, strip.floor), (strip.half, strip.floor), (strip.half, strip.roof - play)]
+    foot, lip = strip.half + strip.lip, strip.top - layout.print.wall_mm
+    inward = max(hinge.gap - strip.half, 0.0)  # at 45 deg, as nothing is below it
+    half = [(strip.half, low + inward), (strip.half, strip.roof - play)]
     half += [(foot, strip.roof - play), (foot, lip), (strip.half, lip), (strip.half, strip.top)]
-    half += [(hinge.half, strip.top), (hinge.half, low), (hinge.gap, low)]
-    half += [(ledge, max(low, strip.floor - 0.6))]
+    half += [(hinge.half, strip.top), (hinge.half, low), (max(hinge.gap, strip.half), low)]
     right = [(z, y) for z, y in half]
     left = [(-z, y) for z, y in half]
     return [kernel.prism([(y, z) for z, y in side], x, "x") for side in (right, left)]
@@ -278,7 +283,7 @@ def bracket(layout: AntennaLayout, mount: Mount, roll: float = 0.0, right: bool 
     if right:
         column = kernel.mirrored(column, "y")
     whole = kernel.joined(fork, column, flange)
-    return kernel.cut(whole, *_screw_holes(mount, height))
+    return kernel.cut(whole, *_screw_holes(mount, height, roll))
 
 
 def _column(layout: AntennaLayout, mount: Mount) -> tuple[float, float]:
@@ -341,16 +346,20 @@ def _flange(layout: AntennaLayout, mount: Mount, back: float, height: float) -> 
     return kernel.joined(disc, kernel.prism(outline, (low, low + FLANGE)))
 
 
-def screw_places(mount: Mount) -> list[tuple[float, float]]:
-    """Places of the screws of the flange; the hole of the horn below the column stays empty."""
-    radius = mount.horn.circle / 2.0
-    return [(radius, 0.0), (0.0, radius), (0.0, -radius)]
+def screw_places(mount: Mount, roll: float = 0.0) -> list[tuple[float, float]]:
+    """Places of the screws of the flange, where a screwdriver passes beside arms and column.
+
+    Three for a straight bracket, two in front for one with a roll, whose arms stand out.
+    """
+    radius, angles = mount.horn.circle / 2.0, (-90.0, 0.0, 90.0) if not roll else (-45.0, 45.0)
+    turns = (math.radians(angle) for angle in angles)
+    return [(radius * math.cos(turn), radius * math.sin(turn)) for turn in turns]
 
 
-def _screw_holes(mount: Mount, height: float) -> list[Solid]:
+def _screw_holes(mount: Mount, height: float, roll: float) -> list[Solid]:
     screw = mount.horn.screw
     holes = []
-    for x, y in screw_places(mount):
+    for x, y in screw_places(mount, roll):
         holes.append(kernel.rod(screw.clearance / 2.0, (x, y, -height - 1), FLANGE + 2))
         holes.append(kernel.rod(screw.head / 2.0 + 0.2, (x, y, -height + FLANGE), 50))
     if mount.horn.centre:

@@ -15,6 +15,7 @@ from typing import Any, Literal
 
 import build123d as bd  # pyright: ignore[reportMissingImports]
 import numpy as np
+from OCP.BRepTools import BRepTools  # pyright: ignore[reportMissingImports]
 
 from antennate.types import Floats
 
@@ -160,6 +161,7 @@ class Mesh:
 
 def mesh(solid: Solid, tolerance: float = 0.02) -> Mesh:
     """Triangles that leave the solid by no more than a distance."""
+    BRepTools.Clean_s(solid.wrapped)  # what measuring left of a coarser mesh has holes
     points, triangles = solid.tessellate(tolerance, 0.2)
     return Mesh(np.array([tuple(p) for p in points]), np.array(triangles, dtype=np.int64))
 

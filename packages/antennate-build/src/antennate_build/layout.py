@@ -18,7 +18,7 @@ from dataclasses import dataclass
 from antennate.errors import ConfigError
 from antennate.robots.antenna import AntennaSpec
 from antennate_build.printing import PrintParams
-from antennate_build.winding import ARBOR_SHARE, Spring
+from antennate_build.winding import ARBOR_SHARE, LEG_ROOM, Spring
 
 STRIPS = {"flex": (6.35, 0.43, 112.2), "fsr": (10.2, 0.30, 120.0)}
 """Width, thickness and whole length of the sensor [mm]: Spectra Symbol FS-L-0095-103 (datasheet);
@@ -31,8 +31,10 @@ _LIP = 0.6
 """How far the lips of the posts reach over a cover [mm]: printed in the air, a line and a half."""
 _HOLE_PLAY = 0.1
 """Hole of a leg over its wire [mm]: a drill of that size clears it."""
-_LEAST_HOLD = 3.0
-"""Length that a leg lies in its hole at least [mm] (assumed: six wires of the default)."""
+_LEAST_HOLD = 2.0
+"""Length that a leg lies in its hole at least [mm] (assumed: four wires of the default)."""
+_LONGEST_POST = 4.5
+"""Longest post and cover along x [mm] (assumed: the strip lies flat under it)."""
 
 
 @dataclass(frozen=True)
@@ -141,13 +143,14 @@ def layout_of(
     wall, play = params.wall_mm, params.play_mm
     width, thickness, _ = STRIPS[antenna.sensor.kind]
     floor = hinge.lug + play
-    roof = floor + thickness + 2.0 * play
+    roof = floor + thickness + play
+    top = roof + 2.0 * wall + play
     strip = StripSizes(
         half=width / 2.0 + play,
         floor=floor,
         roof=roof,
-        top=roof + 2.0 * wall + play,
-        length=min(5.0, 0.3 * length),
+        top=top,
+        length=min(_LONGEST_POST, 0.3 * length, length - 2.0 * (top * hinge.slope + play)),
         lip=_LIP,
     )
     least = max(hinge.half, strip.half + strip.lip + wall)
@@ -202,9 +205,10 @@ def _heightened(hinge: HingeSizes, half: float) -> HingeSizes:
 
 def _require_room(layout: AntennaLayout) -> None:
     """Refuse links that are too short for their hinges."""
-    hinge, length = layout.hinge, layout.length
-    ends = 2.0 * max(hinge.clear + _LEAST_HOLD, -layout.low * hinge.slope + _FACE)
-    top = 2.0 * layout.strip.top * hinge.slope + layout.strip.length
+    hinge, strip, length = layout.hinge, layout.strip, layout.length
+    exposed = math.sqrt(hinge.clear**2 - hinge.leg**2)
+    ends = 2.0 * max(exposed + _LEAST_HOLD + LEG_ROOM, -layout.low * hinge.slope + _FACE)
+    top = 2.0 * (strip.top * hinge.slope + layout.print.play_mm) + layout.print.wall_mm
     least = max(ends, top if layout.sensed else 0.0)
     if length < least:
         raise ConfigError(

@@ -14,7 +14,7 @@ class PrintParams(Params):
     """How parts are printed."""
 
     material: Literal["pla", "petg", "pa12"] = number(
-        "petg", "1", "assumed: tough, and most printers take it"
+        "pla", "1", "assumed: stiff, and every printer takes it"
     )
     """Material; pa12 is sintered nylon."""
     wall_mm: float = number(1.2, "mm", "assumed: three lines of a nozzle of 0.4 mm", ge=0.8, le=4)

@@ -72,21 +72,20 @@ def thinnest(part: Voxels, most: float) -> tuple[float, Floats]:
     """Thinnest wall [mm] in steps of two cubes, at most `most`, and a place in it, shape (3,).
 
     A wall is as thick as the largest ball that reaches it. Edges, which no ball fills, are no
-    walls: what is left of them lies within half a radius of a ball.
+    walls: what is left of them lies within 0.6 radii of a ball.
     """
     depth = ndimage.distance_transform_edt(part.inside) * part.size
-    thickness, place = 2.0 * part.size, np.full(3, np.nan)
-    while thickness < most - 1e-9:
-        radius = (thickness + 2.0 * part.size) / 2.0
-        core = depth >= radius - 0.5 * part.size - 1e-9
-        far = ndimage.distance_transform_edt(~core) * part.size
+    thickness, place = most, np.full(3, np.nan)
+    while thickness > part.size:
+        radius = thickness / 2.0
+        far = ndimage.distance_transform_edt(depth < radius - 0.5 * part.size - 1e-9) * part.size
         far[~part.inside] = 0.0
-        if far.max() > 1.6 * radius:
-            where = np.unravel_index(int(far.argmax()), far.shape)
-            place = part.origin + part.size * np.array(where)
-            break
-        thickness += 2.0 * part.size
-    return min(thickness, most), place
+        if far.max() <= 1.6 * radius:
+            return thickness, place
+        where = np.unravel_index(int(far.argmax()), far.shape)
+        place = part.origin + part.size * np.array(where)
+        thickness -= 2.0 * part.size
+    return max(thickness, 0.0), place
 
 
 @dataclass(frozen=True)
@@ -118,7 +117,8 @@ def overhangs(part: Voxels) -> list[Overhang]:
         labels, count = ndimage.label(free, around)
         for n in range(1, count + 1):
             spot = labels == n
-            if (told := _overhang(spot, below & inside[:, :, k], size, (k - layers[0]) * size)):
+            height = float(k - layers[0]) * size
+            if told := _overhang(spot, below & inside[:, :, k], size, height):
                 found.append(told)
     return found
 
@@ -130,7 +130,7 @@ def _overhang(spot: Bools, held: Bools, size: float, height: float) -> Overhang 
     if not held.any():
         return Overhang(height, area, float("inf"))
     reach = float(ndimage.distance_transform_edt(~held)[spot].max()) * size
-    if reach <= _LEDGE or _is_bridge(spot, held, reach, size):
+    if reach <= _LEDGE + size or _is_bridge(spot, held, reach, size):
         return None
     return Overhang(height, area, reach)
 
@@ -139,14 +139,7 @@ def _is_bridge(spot: Bools, held: Bools, reach: float, size: float) -> bool:
     """Whether what is free is carried on both sides, and short enough."""
     if 2.0 * reach > LONGEST_BRIDGE:
         return False
-    rim = ndimage.binary_dilation(spot, np.ones((3, 3), bool)) & held
-    places = np.argwhere(rim)
-    middle, ends = np.argwhere(spot).mean(axis=0), places - np.argwhere(spot).mean(axis=0)
-    if not len(places) or not np.isfinite(middle).all():
-        return False
-    opposite = -ends
-    # each side of the rim has a counterpart across the middle
-    ways = [ends @ way for way in (np.array([1.0, 0.0]), np.array([0.0, 1.0]))]
-    return len(opposite) > 1 and any(
-        w.max() * size >= 0.6 * reach and -w.min() * size >= 0.6 * reach for w in ways
-    )
+    rim = np.argwhere(ndimage.binary_dilation(spot, np.ones((3, 3), bool)) & held)
+    ends = size * (rim - np.argwhere(spot).mean(axis=0))
+    least = 0.6 * reach
+    return len(ends) > 1 and bool(((ends.max(axis=0) >= least) & (ends.min(axis=0) <= -least)).any())

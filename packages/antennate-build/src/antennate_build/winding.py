@@ -36,8 +36,10 @@ _SPARE_ERROR = 0.02
 """Error that is as good as none beside that."""
 THINNEST_PIN = 2.0
 """Diameter of the thinnest pin that is printed [mm] (assumed: five lines of 0.4 mm)."""
-LONGEST_LEG = 8.0
-"""Length of a leg if its links have room [mm] (assumed: 15 times the wire of the default)."""
+LEG_ROOM = 0.6
+"""What a leg leaves to the middle of its link, from where the leg of the next spring comes [mm]."""
+LONGEST_LEG = 7.0
+"""Length of a leg if its links have room [mm] (assumed: 14 times the wire of the default)."""
 
 
 class WireParams(SpringParams):
@@ -143,7 +145,7 @@ def springs_of(antenna: AntennaSpec, params: WireParams | None = None) -> tuple[
     if not found:
         raise ConfigError(_none(antenna, params, wanted))
     best = _best(found, antenna)
-    leg = min(LONGEST_LEG, 500.0 * antenna.link_length - 1.5)
+    leg = min(LONGEST_LEG, 500.0 * antenna.link_length - LEG_ROOM)
     return tuple(
         Spring(
             turns=turns,

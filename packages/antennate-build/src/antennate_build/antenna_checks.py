@@ -1,0 +1,121 @@
+"""The checks of an antenna: its parts at every angle of its hinges, and the fit of its springs."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+
+import numpy as np
+
+from antennate_build import kernel
+from antennate_build.antenna_assembly import AntennaSolids
+from antennate_build.checks import Check, Meeting, Named, Up, between, judged
+from antennate_build.winding import ARBOR_SHARE
+
+ANGLES = 9
+"""Angles of a hinge that are tried, from one stop to the other."""
+OnPart = Callable[[], object]
+
+
+def up_of(part: str) -> Up:
+    """Direction of a part's frame that points up while it is printed."""
+    return "x" if part.startswith("bracket") else "y"
+
+
+def meetings(antenna: AntennaSolids, tick: OnPart = lambda: None) -> list[Meeting]:
+    """Overlaps at every hinge between its stops, hinges alike once.
+
+    The next but one segment is tried with both hinges between at their stops.
+    """
+    seen: set[tuple[str, ...]] = set()
+    found: list[Meeting] = []
+    names = (antenna.sides[0][0], *antenna.names)
+    for n, pair in enumerate(zip(names, names[1:], strict=False)):
+        tick()
+        if pair not in seen:
+            seen.add(pair)
+            found += _at_hinge(antenna, n)
+    for n, three in enumerate(zip(names, names[1:], names[2:], strict=False)):
+        if three not in seen:
+            seen.add(three)
+            found += _curled(antenna, n)
+    return found
+
+
+def _body(antenna: AntennaSolids, n: int) -> list[Named]:
+    """A segment with its cover and the pin at its tip, in its frame; the bracket if n is 0."""
+    layout = antenna.layout
+    names = (antenna.sides[0][0], *antenna.names)
+    parts: list[Named] = [(names[n], antenna.printed[names[n]])]
+    at = 0.0 if n == 0 else layout.length
+    if n < antenna.hinges:
+        parts.append(("pin", kernel.moved(antenna.printed["pin"], (at, 0.0, 0.0))))
+    if 0 < n <= layout.sensed:
+        half = layout.length / 2.0
+        parts.append(("cover", kernel.moved(antenna.printed["cover"], (half, 0.0, 0.0))))
+    if n == 0 and antenna.roll:
+        fork = antenna.roll  # the pin stands as the fork does
+        parts[1] = ("pin", kernel.turned(parts[1][1], fork, "x"))
+    return parts
+
+
+def _turned(antenna: AntennaSolids, n: int, angle: float, parts: list[Named]) -> list[Named]:
+    """The next body about the hinge at the tip of body n, in the frame of body n."""
+    at = 0.0 if n == 0 else antenna.layout.length
+    roll = antenna.roll if n == 0 else 0.0
+    put = []
+    for name, solid in parts:
+        moved = kernel.moved(kernel.turned(solid, angle), (at, 0.0, 0.0))
+        put.append((name, kernel.turned(moved, roll, "x") if roll else moved))
+    return put
+
+
+def _at_hinge(antenna: AntennaSolids, n: int) -> Iterator[Meeting]:
+    still, moving = _body(antenna, n), _body(antenna, n + 1)
+    stop = antenna.layout.hinge.stop
+    for angle in np.linspace(-stop, stop, ANGLES):
+        turned = _turned(antenna, n, float(angle), moving)
+        yield from between(still, turned, f"at {math.degrees(angle):.0f} deg")
+
+
+def _curled(antenna: AntennaSolids, n: int) -> Iterator[Meeting]:
+    stop = antenna.layout.hinge.stop
+    for angle in (-stop, stop):
+        far = _turned(antenna, n + 1, angle, _body(antenna, n + 2))
+        far = _turned(antenna, n, angle, far)
+        yield from between(_body(antenna, n), far, f"with two hinges at {math.degrees(angle):.0f} deg")
+
+
+def spring_checks(antenna: AntennaSolids) -> list[Check]:
+    """Play of the springs about the pin, in the cavity and between the arms, and their yield."""
+    layout, hinge = antenna.layout, antenna.layout.hinge
+    springs = layout.springs
+    share = max(hinge.pin / s.narrowest for s in springs)
+    around = min(hinge.clear - s.widest / 2.0 for s in springs)
+    along = min(2.0 * hinge.cavity - s.longest for s in springs)
+    held = springs[0].leg - math.sqrt(hinge.clear**2 - hinge.leg**2)
+    early = [n + 1 for n, s in enumerate(springs) if s.yields < s.stop]
+    weakest = min(math.degrees(s.yields) for s in springs)
+    stop = math.degrees(hinge.stop)
+    told = f"the first yields at {weakest:.0f} deg, the stops are at {stop:.0f}"
+    if early:
+        told += f"; a stop does not save spring {', '.join(map(str, early))}"
+    return [
+        Check(
+            "arbor",
+            f"pin of {hinge.pin:.1f} mm, {100 * share:.0f} % of the narrowest inner diameter",
+            share <= ARBOR_SHARE + 1e-9,
+        ),
+        Check(
+            "spring in its seat",
+            f"{around:.2f} mm around and {along:.2f} mm along it at the stops, legs held over "
+            f"{held:.1f} mm",
+            min(around, along, held) > 0.0,
+        ),
+        Check("yield of the springs", told, weakest >= 30.0),
+    ]
+
+
+def assembly_check(antenna: AntennaSolids, tick: OnPart = lambda: None) -> Check:
+    """No two parts of the antenna meet between the stops."""
+    return judged("parts of the antenna, stop to stop", meetings(antenna, tick))
