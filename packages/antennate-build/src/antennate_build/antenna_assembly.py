@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal
 
 from antennate_build import antenna_parts, kernel
 from antennate_build.kernel import Point, Solid
-from antennate_build.layout import AntennaLayout
+from antennate_build.layout import AntennaLayout, segment_names
 from antennate_build.mounts import Mount
 
 Kind = Literal["printed", "bought"]
@@ -56,14 +56,8 @@ class AntennaSolids:
 
     @cached_property
     def names(self) -> tuple[str, ...]:
-        """Part of each segment: segments alike have one name, after the first of them."""
-        names: dict[tuple[object, ...], str] = {}
-        found = []
-        for n in range(self.hinges):
-            springs = self.layout.springs[n : n + 2]
-            key = (*(s.turns for s in springs), len(springs), n < self.layout.sensed)
-            found.append(names.setdefault(key, f"segment_{n + 1}"))
-        return tuple(found)
+        """Part of each segment, base to tip."""
+        return segment_names(self.layout)
 
     @cached_property
     def printed(self) -> dict[str, Solid]:
@@ -134,17 +128,3 @@ class AntennaSolids:
     ) -> Placed:
         put = kernel.moved(kernel.turned(solid, heading) if heading else solid, (*at, 0.0))
         return Placed(name, part, put, "bought" if part == "spring" else "printed")
-
-    def turned_over(self, parts: Sequence[Placed]) -> list[Placed]:
-        """Parts as the antenna stands, with the servo's shaft upright, turned by its roll."""
-        return [
-            Placed(p.name, p.part, kernel.turned(p.solid, self.roll, "x"), p.kind)
-            if not p.part.startswith("bracket")
-            else p
-            for p in parts
-        ]
-
-
-def masses(solids: Mapping[str, Solid], density: float) -> dict[str, float]:
-    """Mass of parts by name [g]."""
-    return {name: density * kernel.volume(solid) for name, solid in solids.items()}

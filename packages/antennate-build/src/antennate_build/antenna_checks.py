@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable, Iterator
 
@@ -30,7 +31,7 @@ def meetings(antenna: AntennaSolids, tick: OnPart = lambda: None) -> list[Meetin
     seen: set[tuple[str, ...]] = set()
     found: list[Meeting] = []
     names = (antenna.sides[0][0], *antenna.names)
-    for n, pair in enumerate(zip(names, names[1:], strict=False)):
+    for n, pair in enumerate(itertools.pairwise(names)):
         tick()
         if pair not in seen:
             seen.add(pair)
@@ -83,7 +84,9 @@ def _curled(antenna: AntennaSolids, n: int) -> Iterator[Meeting]:
     for angle in (-stop, stop):
         far = _turned(antenna, n + 1, angle, _body(antenna, n + 2))
         far = _turned(antenna, n, angle, far)
-        yield from between(_body(antenna, n), far, f"with two hinges at {math.degrees(angle):.0f} deg")
+        yield from between(
+            _body(antenna, n), far, f"with two hinges at {math.degrees(angle):.0f} deg"
+        )
 
 
 def spring_checks(antenna: AntennaSolids) -> list[Check]:

@@ -118,7 +118,9 @@ def _ties(layout: AntennaLayout, number: int, last: bool) -> list[Solid]:
     if not last:
         z = layout.leg_height(number + 1, upper=False)
         ends += [((length - tied, length), (length - held, length), z)]
-    lower = sector(layout, (layout.low, 0.0), layout.length) if last else _both(layout, layout.low, 0.0)
+    lower = (
+        sector(layout, (layout.low, 0.0), layout.length) if last else _both(layout, layout.low, 0.0)
+    )
     floor = kernel.common(
         kernel.prism(lower, (-hinge.gap, hinge.gap)),
         kernel.block((-99, 99), (layout.low, layout.low + wall), (-99, 99)),
@@ -201,7 +203,9 @@ def cover(layout: AntennaLayout) -> Solid:
     """The cover that slides over the sensor, below the lips of two posts."""
     strip, play = layout.strip, layout.print.play_mm
     foot, half = strip.half + strip.lip - play, strip.length / 2.0
-    return kernel.block((-half, half), (strip.roof, strip.roof + layout.print.wall_mm), (-foot, foot))
+    return kernel.block(
+        (-half, half), (strip.roof, strip.roof + layout.print.wall_mm), (-foot, foot)
+    )
 
 
 def _holes(layout: AntennaLayout, number: int, last: bool) -> list[Solid]:
@@ -264,7 +268,7 @@ def hinge_height(layout: AntennaLayout, mount: Mount, roll: float) -> float:
 def bracket(layout: AntennaLayout, mount: Mount, roll: float = 0.0, right: bool = False) -> Solid:
     """The bracket of an antenna: a flange on the horn of its servo, and the outer arms above it.
 
-    The frame is that of the hinge: the antenna leaves along x, the shaft of the servo is the z axis.
+    The frame is that of the hinge: the antenna leaves along x, the servo turns about z.
 
     Args:
         layout: Sizes.
@@ -316,9 +320,7 @@ def _fork(layout: AntennaLayout, mount: Mount) -> Solid:
     rib = kernel.block((front, -hinge.clear), (layout.low, beam - hinge.leg), (z - beam, z + beam))
     lower = [(-px, py) for px, py in sector(layout, (layout.low, 0.0), -front)]
     rib = kernel.common(rib, kernel.prism(lower, (-99, 99)))
-    body = kernel.cut(
-        kernel.joined(column, rib, *stops), kernel.rod(hinge.clear, (0, 0, -50), 100)
-    )
+    body = kernel.cut(kernel.joined(column, rib, *stops), kernel.rod(hinge.clear, (0, 0, -50), 100))
     held = posts(layout, posts_of_bracket(layout, mount), layout.low)
     whole = kernel.joined(body, *arms, *held)
     leg = layout.springs[0].leg + 0.5

@@ -40,7 +40,9 @@ def rod(radius: float, at: Point, length: float, axis: Axis = "z") -> Solid:
     return bd.Solid.make_cylinder(radius, abs(length), bd.Plane(origin=at, z_dir=way))
 
 
-def prism(outline: Sequence[tuple[float, float]], along: Sequence[float], axis: Axis = "z") -> Solid:
+def prism(
+    outline: Sequence[tuple[float, float]], along: Sequence[float], axis: Axis = "z"
+) -> Solid:
     """A prism over an outline.
 
     Args:
@@ -175,7 +177,9 @@ def step(solids: Mapping[str, Solid]) -> bytes:
             children.append(each)
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder, "part.step")
-        whole = children[0] if len(children) == 1 else bd.Compound(label="antennate", children=children)
+        whole = (
+            children[0] if len(children) == 1 else bd.Compound(label="antennate", children=children)
+        )
         bd.export_step(whole, file, timestamp="2020-01-01T00:00:00")
         return file.read_bytes()
 

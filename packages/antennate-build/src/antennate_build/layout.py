@@ -126,6 +126,17 @@ class AntennaLayout:
         return (1.0 if upper else -1.0) * body.turns * body.wire / 2.0
 
 
+def segment_names(layout: AntennaLayout) -> tuple[str, ...]:
+    """Part of each segment, base to tip: segments alike have one name, after the first of them."""
+    names: dict[tuple[object, ...], str] = {}
+    found = []
+    for n in range(layout.antenna.hinges):
+        springs = layout.springs[n : n + 2]
+        key = (*(s.turns for s in springs), len(springs), n < layout.sensed)
+        found.append(names.setdefault(key, f"segment_{n + 1}"))
+    return tuple(found)
+
+
 def layout_of(
     antenna: AntennaSpec, springs: tuple[Spring, ...], params: PrintParams
 ) -> AntennaLayout:
@@ -165,9 +176,7 @@ def layout_of(
     return layout
 
 
-def _hinge(
-    antenna: AntennaSpec, springs: tuple[Spring, ...], params: PrintParams
-) -> HingeSizes:
+def _hinge(antenna: AntennaSpec, springs: tuple[Spring, ...], params: PrintParams) -> HingeSizes:
     wall, play, stop = params.wall_mm, params.play_mm, antenna.range
     pin = math.floor(10.0 * ARBOR_SHARE * min(s.narrowest for s in springs)) / 10.0
     lug = pin / 2.0 + play + wall

@@ -142,4 +142,6 @@ def _is_bridge(spot: Bools, held: Bools, reach: float, size: float) -> bool:
     rim = np.argwhere(ndimage.binary_dilation(spot, np.ones((3, 3), bool)) & held)
     ends = size * (rim - np.argwhere(spot).mean(axis=0))
     least = 0.6 * reach
-    return len(ends) > 1 and bool(((ends.max(axis=0) >= least) & (ends.min(axis=0) <= -least)).any())
+    return len(ends) > 1 and bool(
+        ((ends.max(axis=0) >= least) & (ends.min(axis=0) <= -least)).any()
+    )

@@ -146,8 +146,12 @@ class Part:
 
 def bill(robot: RobotSpec) -> list[Part]:
     """All parts, servos first."""
-    power = supply(robot)
-    return [*_servos(robot), *_electronics(robot), *_power(power), *_body(robot)]
+    return [*bought(robot), *_body(robot)]
+
+
+def bought(robot: RobotSpec) -> list[Part]:
+    """Parts of the bill that are bought as they are: servos, electronics, supply."""
+    return [*_servos(robot), *_electronics(robot), *_power(supply(robot))]
 
 
 def _servos(robot: RobotSpec) -> list[Part]:

@@ -1,0 +1,54 @@
+"""Names of all files of a run, from its configuration alone: known before anything is made."""
+
+from __future__ import annotations
+
+from antennate_build.build.config import BuildConfig
+from antennate_build.layout import AntennaLayout, layout_of, segment_names
+from antennate_build.mounts import Mount, mount_of
+from antennate_build.winding import springs_of
+
+SHEETS = ("antenna", "assembly", "bracket")
+"""Drawings of an antenna."""
+
+
+def antenna_of(config: BuildConfig) -> tuple[AntennaLayout, Mount] | None:
+    """Sizes of the antenna and the servo of its base; None for a robot without antennae."""
+    if not config.robot.antenna_count:
+        return None
+    springs = springs_of(config.robot.antenna, config.springs)
+    layout = layout_of(config.robot.antenna, springs, config.print)
+    return layout, mount_of(config.robot.antennae.servo, "robot.antennae.servo")
+
+
+def brackets(config: BuildConfig) -> tuple[tuple[str, bool], ...]:
+    """Brackets of the antennae, and whether each is the right one."""
+    if config.what == "antenna":
+        return (("bracket", False),)
+    return (("bracket_left", False), ("bracket_right", True))
+
+
+def part_names(config: BuildConfig) -> tuple[str, ...]:
+    """Printed parts."""
+    names: list[str] = []
+    if (found := antenna_of(config)) is not None:
+        names += [name for name, _ in brackets(config)]
+        names += [*dict.fromkeys(segment_names(found[0])), "pin", "cover"]
+    return tuple(names)
+
+
+def sheet_names(config: BuildConfig) -> tuple[str, ...]:
+    """Drawings."""
+    return SHEETS if config.robot.antenna_count else ()
+
+
+def file_names(config: BuildConfig) -> tuple[str, ...]:
+    """All files beside those that every run has."""
+    parts = part_names(config)
+    return (
+        *(f"stl/{name}.stl" for name in parts),
+        *(f"step/{name}.step" for name in parts),
+        "step/assembly.step",
+        *(f"drawings/{name}.pdf" for name in sheet_names(config)),
+        "assembly.md",
+        "bom.csv",
+    )
