@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 
 from antennate_build import kernel
+from antennate_build.flange import FLANGE, flange_radius, hinge_height, screw_places
 from antennate_build.kernel import Solid
 from antennate_build.layout import FOOT, AntennaLayout
 from antennate_build.mounts import Mount
@@ -20,12 +21,6 @@ PIN_HEAD = 1.2
 """Thickness of a pin's head [mm]."""
 PRESS = 0.05
 """Hole of the outer arms over the pin [mm]: it sits there, and turns in the inner arms."""
-FLANGE = 2.0
-"""Thickness of the bracket's flange on the horn [mm]: a screw M2 x 4 then bites 2 mm."""
-SCREW_LENGTH = 4.0
-"""Length of the screws of the flange [mm]."""
-_HEAD_ROOM = 0.6
-"""Between heads of screws and what turns above them [mm]."""
 
 
 Outline = list[tuple[float, float]]
@@ -241,30 +236,6 @@ def spring(layout: AntennaLayout, number: int) -> Solid:
     return kernel.coil(body.coil / 2.0, body.wire, body.turns, (body.leg, body.leg))
 
 
-def hinge_height(layout: AntennaLayout, mount: Mount, roll: float) -> float:
-    """Height of the first hinge above the face of the horn [mm].
-
-    The first segment must pass above flange and screws at every angle of its hinge. `roll` turns
-    the plane in which it bends about the antenna's own axis [rad].
-    """
-    hinge, radius = layout.hinge, flange_radius(layout, mount)
-    above = FLANGE + mount.horn.screw.head_height + _HEAD_ROOM
-    lowest = 0.0
-    sides = (layout.low, layout.strip.top)
-    for n in range(-20, 21):
-        angle = hinge.stop * n / 20.0
-        for y in sides:
-            for z in (-hinge.half, hinge.half):
-                for x in (0.0, *(layout.length * k / 8.0 for k in range(1, 17))):
-                    along = x * math.cos(angle) - y * math.sin(angle)
-                    across = x * math.sin(angle) + y * math.cos(angle)
-                    left = across * math.cos(roll) - z * math.sin(roll)
-                    up = across * math.sin(roll) + z * math.cos(roll)
-                    if math.hypot(along, left) <= radius + 2.0:
-                        lowest = min(lowest, up)
-    return above - lowest
-
-
 def bracket(layout: AntennaLayout, mount: Mount, roll: float = 0.0, right: bool = False) -> Solid:
     """The bracket of an antenna: a flange on the horn of its servo, and the outer arms above it.
 
@@ -331,12 +302,6 @@ def _fork(layout: AntennaLayout, mount: Mount) -> Solid:
     )
 
 
-def flange_radius(layout: AntennaLayout, mount: Mount) -> float:
-    """Radius of the bracket's flange: that of the horn, or more for walls about the screws."""
-    holes = mount.horn.circle / 2.0 + mount.horn.screw.clearance / 2.0 + layout.print.wall_mm
-    return max(mount.horn.diameter / 2.0, holes)
-
-
 def _flange(layout: AntennaLayout, mount: Mount, back: float, height: float) -> Solid:
     """The plate on the horn, drawn back to the column so that it prints upright without support."""
     radius, low = flange_radius(layout, mount), -height
@@ -346,16 +311,6 @@ def _flange(layout: AntennaLayout, mount: Mount, back: float, height: float) -> 
     x, y = radius * math.cos(tangent), radius * math.sin(tangent)
     outline = [(back, side), (x, y), (x, -y), (back, -side)]
     return kernel.joined(disc, kernel.prism(outline, (low, low + FLANGE)))
-
-
-def screw_places(mount: Mount, roll: float = 0.0) -> list[tuple[float, float]]:
-    """Places of the screws of the flange, where a screwdriver passes beside arms and column.
-
-    Three for a straight bracket, two in front for one with a roll, whose arms stand out.
-    """
-    radius, angles = mount.horn.circle / 2.0, (-90.0, 0.0, 90.0) if not roll else (-45.0, 45.0)
-    turns = (math.radians(angle) for angle in angles)
-    return [(radius * math.cos(turn), radius * math.sin(turn)) for turn in turns]
 
 
 def _screw_holes(mount: Mount, height: float, roll: float) -> list[Solid]:

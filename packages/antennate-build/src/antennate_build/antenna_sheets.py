@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from antennate import figures as style
 from antennate.robots.antenna import N_MM_PER_DEG
-from antennate_build import antenna_parts, kernel, sheet
+from antennate_build import antenna_parts, flange, kernel, sheet
 from antennate_build.antenna_assembly import AntennaSolids
 from antennate_build.layout import STRIPS
 from antennate_build.sheet import View
@@ -106,9 +106,9 @@ def _whole_sizes(antenna: AntennaSolids, above: View, side: View) -> None:
     above.length((0, high, 0), (end, high, 0), (0, 14), f"{end:.1f}")
     above.length((0, high, 0), (layout.length, high, 0), (0, 7), f"{layout.length:.1f}")
     above.length((end, layout.low, 0), (end, high, 0), (9, 0), f"{high - layout.low:.1f}")
-    low = -antenna_parts.hinge_height(layout, antenna.mount, antenna.roll)
+    low = -flange.hinge_height(layout, antenna.mount, antenna.roll)
     side.length((end, 0, -hinge.half), (end, 0, hinge.half), (9, 0), f"{2 * hinge.half:.1f}")
-    back = -antenna_parts.flange_radius(layout, antenna.mount) - 4.0
+    back = -flange.flange_radius(layout, antenna.mount) - 4.0
     side.length((back, 0, low), (back, 0, 0), (-6, 0), f"{-low:.2f}")
 
 
@@ -194,8 +194,8 @@ def bracket_sheet(antenna: AntennaSolids) -> Figure:
     part = antenna.printed[name]
     scale = 3.0
     horn, screw = mount.horn, mount.horn.screw
-    length = antenna_parts.SCREW_LENGTH
-    screws = antenna_parts.screw_places(mount, antenna.roll)
+    length = flange.SCREW_LENGTH
+    screws = flange.screw_places(mount, antenna.roll)
     notes = (
         f"{scale:g} : 1; {layout.print.material.upper()}; upright on its back",
         f"{len(screws)} {screw.name} x {length:g} into the horn",
@@ -203,7 +203,7 @@ def bracket_sheet(antenna: AntennaSolids) -> Figure:
     )
     title = "Bracket" if name == "bracket" else "Bracket, left"
     figure, axes = sheet.new(sheet.A4, title, notes)
-    height = antenna_parts.hinge_height(layout, mount, antenna.roll)
+    height = flange.hinge_height(layout, mount, antenna.roll)
     above = View(axes, (80.0, 160.0), scale, *TOP)
     above.draw(part, hidden=True)
     side = View(axes, (80.0, 84.0), scale, *SIDE)
@@ -212,7 +212,7 @@ def bracket_sheet(antenna: AntennaSolids) -> Figure:
     end.draw(part, hidden=True)
     oblique = View(axes, (215.0, 158.0), 0.8 * scale, (0.6, -0.65, 0.45), (0.0, 0.0, 1.0))
     oblique.draw(part, colour=PALE["printed"])
-    radius = antenna_parts.flange_radius(layout, mount)
+    radius = flange.flange_radius(layout, mount)
     (back, _), (front, _) = kernel.bounds(part)[0][:2], (radius, 0)
     above.length((back, -radius, 0), (front, -radius, 0), (0, -8), f"{front - back:.2f}")
     above.radius((0, 0, 0), radius, -35, f"R {radius:.2f}")
@@ -230,9 +230,9 @@ def bracket_sheet(antenna: AntennaSolids) -> Figure:
     side.length((radius, 0, -height), (radius, 0, 0), (8, 0), f"{height:.2f}")
     side.length(
         (radius, 0, -height),
-        (radius, 0, -height + antenna_parts.FLANGE),
+        (radius, 0, -height + flange.FLANGE),
         (18, 0),
-        f"{antenna_parts.FLANGE:g}",
+        f"{flange.FLANGE:g}",
     )
     side.length(
         (back, 0, -height),
@@ -256,7 +256,7 @@ def exploded_sheet(antenna: AntennaSolids, steps: tuple[str, ...]) -> Figure:
     layout = antenna.layout
     figure, axes = sheet.new(sheet.A3, "Antenna: assembly", ("not to scale",))
     gap, shown = 2.0 * layout.springs[0].leg + 10.0, min(2, antenna.hinges)
-    first = antenna_parts.flange_radius(layout, antenna.mount) + gap
+    first = flange.flange_radius(layout, antenna.mount) + gap
     scale = 330.0 / (first + shown * (layout.length + gap))
     view = View(axes, (75.0, 140.0), scale, *OBLIQUE)
     named: dict[str, tuple[float, float]] = {}

@@ -14,9 +14,11 @@ from antennate.params.spring import SpringParams
 from antennate.robots.parts import bought
 from antennate.robots.spec import RobotSpec
 from antennate.studies.formats import to_csv
-from antennate_build import antenna_parts
+from antennate_build import flange
 from antennate_build.antenna_assembly import AntennaSolids
 from antennate_build.layout import STRIPS, AntennaLayout
+from antennate_build.link_parts import HEAD_BOLTS
+from antennate_build.robot_assembly import RobotSolids
 from antennate_build.winding import Spring, set_of
 
 WIRE_NAMES = {
@@ -108,11 +110,6 @@ def bought_items(robot: RobotSpec) -> list[Item]:
     return [Item(part.count, part.item, part.use, part.rating) for part in bought(robot)]
 
 
-def screw_items(screws: Mapping[str, int]) -> list[Item]:
-    """Screws by name and length."""
-    return [Item(count, name, "printed parts to servos", name) for name, count in screws.items()]
-
-
 def as_csv(items: list[Item]) -> str:
     """The bill as a file."""
     rows = [
@@ -128,8 +125,8 @@ def antenna_items(antenna: AntennaSolids, antennae: int) -> list[Item]:
     width, thickness, length = STRIPS[kind]
     what = "flex sensor" if kind == "flex" else "pressure strip"
     known = "Spectra Symbol FS-L-0095-103" if kind == "flex" else "ZD10-100"
-    screws = len(antenna_parts.screw_places(mount, antenna.roll))
-    screw = f"{mount.horn.screw.name} x {antenna_parts.SCREW_LENGTH:g}"
+    screws = len(flange.screw_places(mount, antenna.roll))
+    screw = f"{mount.horn.screw.name} x {flange.SCREW_LENGTH:g}"
     return [
         Item(
             antennae,
@@ -139,3 +136,31 @@ def antenna_items(antenna: AntennaSolids, antennae: int) -> list[Item]:
         ),
         Item(antennae * screws, screw, "bracket to horn", f"{screw}, pan head"),
     ]
+
+
+def link_items(robot: RobotSolids) -> list[Item]:
+    """Screws of the links, bolts of the hinges."""
+    layout, links = robot.layout, robot.layout.robot.links
+    joints, yaw, leg = links - 1, layout.yaw, layout.leg
+    hinged = [yaw, *([layout.pitch] if layout.pitch is not None else [])]
+    horns = joints * sum(2 * mount.horn.holes for mount in hinged) + 2 * links * leg.horn.holes
+    cases = joints * sum(len(mount.sides) for mount in hinged) + joints * len(yaw.sides)
+    cases += 2 * links * len(leg.back)
+    items = [
+        Item(
+            horns, f"{leg.horn.screw.name} x 6", "hinges and legs to horns and idlers", "pan head"
+        ),
+        Item(cases, f"{leg.screw.name} x 6", "servos to frames; x 8 through the cabin", "pan head"),
+        Item(4 * joints, "bolt M3 x 10 with nut", "hinges", "ISO 4762, ISO 4032"),
+    ]
+    if robot.base is not None:
+        items += [
+            Item(len(HEAD_BOLTS), "bolt M3 x 10 with nut", "head plate", "ISO 4762, ISO 4032"),
+            Item(
+                2 * len(robot.base.back),
+                f"{robot.base.screw.name} x 6",
+                "base servos to the head plate",
+                "pan head",
+            ),
+        ]
+    return items

@@ -126,6 +126,8 @@ X430 = Mount(
     screw=M2_5_TAPPING,
     source="ROBOTIS: solid XL-430_new; drawing HN12-N101 of 2019-05-22; frames FR12",
 )
+GRAMS = {"xc430_w240": 65.0, "xl430_w250": 57.2, "xl330_m288": 18.0}
+"""Mass of a servo by its name [g]: ROBOTIS e-manual."""
 MOUNTS = {"xc430_w240": X430, "xl430_w250": X430, "xl330_m288": X330}
 """Cases by the name of a servo in a robot's description."""
 

@@ -16,6 +16,7 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
+from trimesh.remesh import subdivide_to_size
 
 from antennate import __version__
 from antennate import figures as style
@@ -177,10 +178,18 @@ class View:
             )
         )
 
-    def _front(self, solid: Solid) -> tuple[Floats, Floats, Floats]:
-        """Triangles that face the eye on the sheet, their nearness and how bright they are."""
+    def _front(self, solid: Solid, most: float = math.inf) -> tuple[Floats, Floats, Floats]:
+        """Triangles that face the eye on the sheet, their nearness and how bright they are.
+
+        Args:
+            solid: The solid.
+            most: Longest edge of a triangle [mm]: large ones have no nearness of their own.
+        """
         mesh, eye = kernel.mesh(solid, 0.1), np.array(self.eye) / np.linalg.norm(self.eye)
         corners = mesh.points[mesh.triangles]
+        if math.isfinite(most):
+            points, triangles = subdivide_to_size(mesh.points, mesh.triangles, most, 20)[:2]
+            corners = points[triangles]
         normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
         facing = normals @ eye > 0.0
@@ -192,7 +201,7 @@ class View:
 
     def scene(self, parts: Sequence[tuple[Solid, str]]) -> None:
         """Draw coloured solids, shaded and with edges, what is near over what is far."""
-        found = [(*self._front(solid), to_rgb(colour)) for solid, colour in parts]
+        found = [(*self._front(solid, 3.0), to_rgb(colour)) for solid, colour in parts]
         flat = np.concatenate([each[0] for each in found])
         order = np.argsort(np.concatenate([each[1] for each in found]))
         colours = np.concatenate([each[2][:, None] * np.array(each[3]) for each in found])

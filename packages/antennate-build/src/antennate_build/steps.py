@@ -4,15 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from antennate_build import antenna_parts
+from antennate_build import flange
 from antennate_build.layout import STRIPS, AntennaLayout
+from antennate_build.link_layout import LinkLayout
 from antennate_build.mounts import Mount
 
 
 def antenna_steps(layout: AntennaLayout, mount: Mount, roll: float = 0.0) -> tuple[str, ...]:
     """Steps from printed parts and springs to an antenna on its servo."""
     hinge, count = layout.hinge, layout.antenna.hinges
-    screws = len(antenna_parts.screw_places(mount, roll))
+    screws = len(flange.screw_places(mount, roll))
     screw = mount.horn.screw.name.partition(" M")[2]
     thickness = STRIPS[layout.antenna.sensor.kind][1]
     sensor = "flex sensor" if layout.antenna.sensor.kind == "flex" else "pressure strip"
@@ -22,7 +23,7 @@ def antenna_steps(layout: AntennaLayout, mount: Mount, roll: float = 0.0) -> tup
         f"with {hinge.pin + layout.print.play_mm:.1f} mm (inner arms: a pin turns freely) and "
         f"{hinge.pin:.1f} mm (outer arms: it sits tight).",
         f"Screw the bracket onto the horn with {screws} screws M{screw} x "
-        f"{antenna_parts.SCREW_LENGTH:g}; the servo is at its zero and the arms point along the antenna.",
+        f"{flange.SCREW_LENGTH:g}, its arms along the antenna while the servo is at its zero.",
         "Push the lower leg of the stiffest spring into the hole of the bracket, up to the coil.",
         "Slide segment 1 onto the upper leg, its inner arms between those of the bracket.",
         "Push a pin from above through arms and spring, its flat towards the legs.",
@@ -35,6 +36,50 @@ def antenna_steps(layout: AntennaLayout, mount: Mount, roll: float = 0.0) -> tup
         "and slide a cover below the lips of each pair of posts. It must slide when a hinge bends.",
         "Fix the contacts of the sensor at the bracket with a drop of glue; lead its wires along "
         "the servo with a loop of 30 mm.",
+    )
+
+
+def link_steps(layout: LinkLayout, base: Mount | None) -> tuple[str, ...]:
+    """Steps from printed frames and servos to a robot, tail first."""
+    robot, leg = layout.robot, layout.leg
+    joint = (
+        "bolt a hinge to the rear wall of the link ahead with four M3 x 10"
+        if layout.pitch is None
+        else "bolt hinge and hinge_pitch together, web to web, with four M3 x 10, and put "
+        "hinge_pitch onto the pitch servo of the link ahead"
+    )
+    pitch = (
+        ()
+        if layout.pitch is None
+        else (
+            "Screw a pitch servo onto the floor of each link but the tail, from below, its shaft "
+            "across and behind.",
+        )
+    )
+    head = (
+        ()
+        if base is None
+        else (
+            "Screw both base servos into the head plate, horns down, and bolt the plate to the front "
+            "wall of the head with eight M3 x 10. The brackets of the antennae come below: "
+            "bracket_right left, bracket_left right, as they hang upside down.",
+            "Lay ESP32 and converter into the cabin; its flaps go under the upper screws of the leg "
+            "servos of the head, which are 8 mm long there.",
+        )
+    )
+    return (
+        "Set the ids of all servos with `antennate setup` before they are built in.",
+        f"Screw two leg servos to the side walls of each of the {robot.links} frames from inside, "
+        f"{len(leg.back)} screws each; their long ends point backward, their plugs to the gap.",
+        "Push a yaw servo into the cradle of each frame but the head, its horn up, and screw it "
+        "from both sides.",
+        *pitch,
+        f"At each joint {joint}; then screw the arms of the hinge to horn and idler of the yaw "
+        "servo behind.",
+        "Pull a tread over each leg and screw the leg onto its horn; all rings point down at zero.",
+        "Lead the cables along the floor through the holes of the hinges, with a loop at each "
+        "joint, and tie them at the slots.",
+        *head,
     )
 
 

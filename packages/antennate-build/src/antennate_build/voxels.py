@@ -14,7 +14,7 @@ from scipy import ndimage
 from antennate.types import Bools, Floats
 from antennate_build.kernel import Mesh
 
-LONGEST_BRIDGE = 10.0
+LONGEST_BRIDGE = 12.0
 """Longest gap that is bridged in the air [mm] (assumed: what printers of plastic wire manage)."""
 _LEDGE = 0.6
 """Farthest that something may stand out over nothing [mm] (assumed: a line and a half)."""

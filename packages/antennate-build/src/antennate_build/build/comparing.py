@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
+from antennate.robots.spec import RobotSpec
 from antennate_build import kernel
 from antennate_build.antenna_assembly import AntennaSolids
 from antennate_build.build.result import Compared
+from antennate_build.mounts import GRAMS
+from antennate_build.robot_assembly import RobotSolids
 
 
 def compared(unit: str, specified: float, built: float) -> Compared:
@@ -41,4 +46,36 @@ def antenna_masses(antenna: AntennaSolids) -> dict[str, Compared]:
         "link's mass, mean": compared("g", 1e3 * spec.link_mass, sum(links) / len(links)),
         "bracket's mass": compared("g", 1e3 * spec.base_mass, bracket),
         "antenna's inertia about its base": compared("g·mm²", rods, inertia),
+    }
+
+
+def robot_masses(
+    spec: RobotSpec,
+    robot: RobotSolids,
+    grams: Mapping[str, float],
+    antennae: Mapping[str, Compared],
+) -> dict[str, Compared]:
+    """Mass of a robot, of a link and of a leg; battery, boards, cables and screws are not built.
+
+    Args:
+        spec: The robot.
+        robot: Its links.
+        grams: Mass of each printed part of the links [g].
+        antennae: Masses of its antennae, if it has some.
+    """
+    servos = sum(GRAMS[name] for name in spec.servo_names)
+    printed = sum(robot.counts[name] * grams[name] for name in robot.counts)
+    pair = 0.0
+    if "antenna's mass" in antennae:
+        pair = spec.antenna_count * antennae["antenna's mass"].built
+    leg = grams["leg"] + grams["tread"]
+    carried = [spec.yaw.servo, *([spec.pitch.servo] if spec.pitch_count else [])]
+    link = 2.0 * GRAMS[spec.legs.servo] + sum(GRAMS[name] for name in carried)
+    link += grams.get("frame", grams["frame_tail"]) + grams["hinge"] + grams.get("hinge_pitch", 0)
+    return {
+        "robot without battery, boards, cables": compared(
+            "g", 1e3 * spec.mass, servos + printed + pair
+        ),
+        "link between two others": compared("g", 1e3 * spec.link_mass, link),
+        "leg's mass": compared("g", 1e3 * spec.leg_mass, leg),
     }

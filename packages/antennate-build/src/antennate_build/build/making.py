@@ -10,11 +10,20 @@ from dataclasses import dataclass, field
 from matplotlib.figure import Figure
 
 from antennate.robots.antenna import N_MM_PER_DEG
-from antennate_build import antenna_checks, antenna_sheets, billing, checks, kernel, steps
+from antennate_build import (
+    antenna_checks,
+    antenna_sheets,
+    billing,
+    checks,
+    kernel,
+    link_sheets,
+    robot_assembly,
+    steps,
+)
 from antennate_build.antenna_assembly import AntennaSolids
-from antennate_build.build.comparing import antenna_masses
+from antennate_build.build.comparing import antenna_masses, robot_masses
 from antennate_build.build.config import BuildConfig
-from antennate_build.build.naming import antenna_of, brackets, sheet_names
+from antennate_build.build.naming import antenna_of, brackets, links_of, sheet_names
 from antennate_build.build.result import (
     BuildResult,
     Checked,
@@ -24,6 +33,7 @@ from antennate_build.build.result import (
 )
 from antennate_build.checks import Check, Up
 from antennate_build.kernel import Solid
+from antennate_build.robot_assembly import RobotSolids
 from antennate_build.winding import set_of
 
 OnStep = Callable[[int, int], None]
@@ -75,6 +85,10 @@ def made(
         antenna = AntennaSolids(layout, mount, roll, brackets(config))
         _add_antenna(product, config, antenna, tick)
         springs = _springs(antenna)
+    if (links := links_of(config)) is not None:
+        layout, horn = links
+        robot = RobotSolids(layout, None if found is None else found[1], horn)
+        _add_links(product, config, robot, tick)
     prints, files = _printed(product, config, tick)
     result = BuildResult(
         parts=prints,
@@ -121,6 +135,29 @@ def _add_antenna(
     product.items += billing.printed_items(counts, grams, layout.print.material)
     product.items += billing.spring_items(layout, config.springs, pair)
     product.items += billing.antenna_items(antenna, pair)
+
+
+def _add_links(
+    product: Product, config: BuildConfig, robot: RobotSolids, tick: Callable[[], None]
+) -> None:
+    for name, solid in robot.printed.items():
+        product.parts[name] = solid
+        product.counts[name] = robot.counts[name]
+        product.ups[name] = robot_assembly.up_of(name)
+        tick()
+    for n, (name, solid) in enumerate(robot.whole()):
+        product.placed[f"{name} {n + 1}"] = solid
+    product.checks += robot_assembly.robot_checks(robot, tick)
+    grams = {name: config.print.density * kernel.volume(s) for name, s in robot.printed.items()}
+    product.masses = robot_masses(config.robot, robot, grams, product.masses) | product.masses
+    product.steps["Links"] = steps.link_steps(robot.layout, robot.base)
+    product.figures |= {
+        "link": link_sheets.link_sheet(robot),
+        "robot": link_sheets.shaded(robot),
+    }
+    product.items += billing.printed_items(robot.counts, grams, config.print.material)
+    product.items += billing.link_items(robot)
+    product.items += billing.bought_items(config.robot)
 
 
 def _bent(hinges: int, stop: float) -> tuple[float, ...]:

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 from antennate_build.build.config import BuildConfig
+from antennate_build.flange import hinge_height
 from antennate_build.layout import AntennaLayout, layout_of, segment_names
+from antennate_build.link_layout import LinkLayout, link_layout
+from antennate_build.link_layout import part_names as link_part_names
 from antennate_build.mounts import Mount, mount_of
 from antennate_build.winding import springs_of
 
@@ -20,6 +23,21 @@ def antenna_of(config: BuildConfig) -> tuple[AntennaLayout, Mount] | None:
     return layout, mount_of(config.robot.antennae.servo, "robot.antennae.servo")
 
 
+def links_of(config: BuildConfig) -> tuple[LinkLayout, float] | None:
+    """Sizes of the links, and the height of the horns of the base servos over the antennae [mm].
+
+    None where an antenna is built alone; the height is 0 for a robot without antennae.
+    """
+    if config.what == "antenna":
+        return None
+    horn = head = 0.0
+    if (found := antenna_of(config)) is not None:
+        layout, mount = found
+        horn = hinge_height(layout, mount, config.robot.antenna.roll)
+        head = horn + mount.horn.top - mount.z[0] + 3.0
+    return link_layout(config.robot, config.print, head), horn
+
+
 def brackets(config: BuildConfig) -> tuple[tuple[str, bool], ...]:
     """Brackets of the antennae, and whether each is the right one."""
     if config.what == "antenna":
@@ -33,12 +51,15 @@ def part_names(config: BuildConfig) -> tuple[str, ...]:
     if (found := antenna_of(config)) is not None:
         names += [name for name, _ in brackets(config)]
         names += [*dict.fromkeys(segment_names(found[0])), "pin", "cover"]
+    if (links := links_of(config)) is not None:
+        names += link_part_names(links[0], found is not None)
     return tuple(names)
 
 
 def sheet_names(config: BuildConfig) -> tuple[str, ...]:
     """Drawings."""
-    return SHEETS if config.robot.antenna_count else ()
+    links = ("link",) if config.what == "robot" else ()
+    return (*SHEETS, *links) if config.robot.antenna_count else links
 
 
 def file_names(config: BuildConfig) -> tuple[str, ...]:
