@@ -40,14 +40,17 @@ class AntennaSolids:
     Attributes:
         layout: Sizes.
         mount: The servo of its base.
-        roll: Turn of the plane in which it bends [rad].
-        sides: Names of the brackets and whether each is that of the right antenna.
+        sides: Names of the brackets, and how each turns the antenna about its own axis [rad].
     """
 
     layout: AntennaLayout
     mount: Mount
-    roll: float = 0.0
-    sides: tuple[tuple[str, bool], ...] = (("bracket", False),)
+    sides: tuple[tuple[str, float], ...] = (("bracket", 0.0),)
+
+    @property
+    def standing(self) -> tuple[str, float]:
+        """The bracket on which the antenna stands most upright, and its turn."""
+        return min(self.sides, key=lambda side: abs(side[1]))
 
     @property
     def hinges(self) -> int:
@@ -63,8 +66,7 @@ class AntennaSolids:
     def printed(self) -> dict[str, Solid]:
         """Printed parts by name."""
         parts = {
-            name: antenna_parts.bracket(self.layout, self.mount, self.roll, right)
-            for name, right in self.sides
+            name: antenna_parts.bracket(self.layout, self.mount, turn) for name, turn in self.sides
         }
         for n, name in enumerate(self.names):
             if name not in parts:
@@ -99,8 +101,10 @@ class AntennaSolids:
             springs: Whether the springs are among them, as they are at rest.
         """
         angles = tuple(angles) or (0.0,) * self.hinges
-        bracket = self.sides[0][0]
-        parts = [Placed(bracket, bracket, self.printed[bracket], "printed")]
+        bracket, turn = self.standing
+        solid = self.printed[bracket]
+        solid = kernel.turned(solid, -turn, "x") if turn else solid
+        parts = [Placed(bracket, bracket, solid, "printed")]
         middle = antenna_parts.posts_of_bracket(self.layout, self.mount)
         parts.append(self._cover(1, (sum(middle) / 2.0, 0.0, 0.0), (0.0, 0.0), 0.0))
         at, heading = (0.0, 0.0), 0.0
@@ -118,6 +122,25 @@ class AntennaSolids:
                 at[1] + self.layout.length * math.sin(heading),
             )
         return parts
+
+    def hung(self, side: int, heading: float) -> list[Placed]:
+        """All printed parts of an antenna of a robot, straight, in the frame of its base.
+
+        A robot carries its antennae upside down: their servos are above them.
+
+        Args:
+            side: 0 for the left one, 1 for the right one.
+            heading: Angle from the heading of the robot to the left [rad].
+        """
+        name, turn = self.sides[side]
+        found = []
+        for part in self.placed(springs=False):
+            own = part.part.startswith("bracket")
+            solid = self.printed[name] if own else kernel.turned(part.solid, turn, "x")
+            over = kernel.turned(solid, math.pi, "x")
+            put = kernel.turned(over, heading)
+            found.append(Placed(part.name, name if own else part.part, put, part.kind))
+        return found
 
     def _cover(self, number: int, place: Point, at: tuple[float, float], heading: float) -> Placed:
         solid = kernel.moved(self.printed["cover"], place)

@@ -30,63 +30,67 @@ def meetings(antenna: AntennaSolids, tick: OnPart = lambda: None) -> list[Meetin
     """
     seen: set[tuple[str, ...]] = set()
     found: list[Meeting] = []
-    names = (antenna.sides[0][0], *antenna.names)
-    for n, pair in enumerate(itertools.pairwise(names)):
-        tick()
-        if pair not in seen:
-            seen.add(pair)
-            found += _at_hinge(antenna, n)
-    for n, three in enumerate(zip(names, names[1:], names[2:], strict=False)):
-        if three not in seen:
-            seen.add(three)
-            found += _curled(antenna, n)
+    for side in antenna.sides:
+        names = (side[0], *antenna.names)
+        for n, pair in enumerate(itertools.pairwise(names)):
+            tick()
+            if pair not in seen:
+                seen.add(pair)
+                found += _at_hinge(antenna, side, n)
+        for n, three in enumerate(zip(names, names[1:], names[2:], strict=False)):
+            if three not in seen:
+                seen.add(three)
+                found += _curled(antenna, side, n)
     return found
 
 
-def _body(antenna: AntennaSolids, n: int) -> list[Named]:
+Side = tuple[str, float]
+"""A bracket, and how it turns the antenna about its own axis [rad]."""
+
+
+def _body(antenna: AntennaSolids, side: Side, n: int) -> list[Named]:
     """A segment with its cover and the pin at its tip, in its frame; the bracket if n is 0."""
-    layout = antenna.layout
-    names = (antenna.sides[0][0], *antenna.names)
-    parts: list[Named] = [(names[n], antenna.printed[names[n]])]
-    at = 0.0 if n == 0 else layout.length
+    layout, (bracket, turn) = antenna.layout, side
+    pin = antenna.printed["pin"]
+    if n == 0:
+        return [(bracket, antenna.printed[bracket]), ("pin", kernel.turned(pin, turn, "x"))]
+    name = antenna.names[n - 1]
+    parts: list[Named] = [(name, antenna.printed[name])]
     if n < antenna.hinges:
-        parts.append(("pin", kernel.moved(antenna.printed["pin"], (at, 0.0, 0.0))))
-    if 0 < n <= layout.sensed:
+        parts.append(("pin", kernel.moved(pin, (layout.length, 0.0, 0.0))))
+    if n <= layout.sensed:
         half = layout.length / 2.0
         parts.append(("cover", kernel.moved(antenna.printed["cover"], (half, 0.0, 0.0))))
-    if n == 0 and antenna.roll:
-        fork = antenna.roll  # the pin stands as the fork does
-        parts[1] = ("pin", kernel.turned(parts[1][1], fork, "x"))
     return parts
 
 
-def _turned(antenna: AntennaSolids, n: int, angle: float, parts: list[Named]) -> list[Named]:
+def _turned(
+    antenna: AntennaSolids, side: Side, n: int, angle: float, parts: list[Named]
+) -> list[Named]:
     """The next body about the hinge at the tip of body n, in the frame of body n."""
-    at = 0.0 if n == 0 else antenna.layout.length
-    roll = antenna.roll if n == 0 else 0.0
+    at, turn = (antenna.layout.length, 0.0) if n else (0.0, side[1])
     put = []
     for name, solid in parts:
         moved = kernel.moved(kernel.turned(solid, angle), (at, 0.0, 0.0))
-        put.append((name, kernel.turned(moved, roll, "x") if roll else moved))
+        put.append((name, kernel.turned(moved, turn, "x") if turn else moved))
     return put
 
 
-def _at_hinge(antenna: AntennaSolids, n: int) -> Iterator[Meeting]:
-    still, moving = _body(antenna, n), _body(antenna, n + 1)
+def _at_hinge(antenna: AntennaSolids, side: Side, n: int) -> Iterator[Meeting]:
+    still, moving = _body(antenna, side, n), _body(antenna, side, n + 1)
     stop = antenna.layout.hinge.stop
     for angle in np.linspace(-stop, stop, ANGLES):
-        turned = _turned(antenna, n, float(angle), moving)
+        turned = _turned(antenna, side, n, float(angle), moving)
         yield from between(still, turned, f"at {math.degrees(angle):.0f} deg")
 
 
-def _curled(antenna: AntennaSolids, n: int) -> Iterator[Meeting]:
+def _curled(antenna: AntennaSolids, side: Side, n: int) -> Iterator[Meeting]:
     stop = antenna.layout.hinge.stop
     for angle in (-stop, stop):
-        far = _turned(antenna, n + 1, angle, _body(antenna, n + 2))
-        far = _turned(antenna, n, angle, far)
-        yield from between(
-            _body(antenna, n), far, f"with two hinges at {math.degrees(angle):.0f} deg"
-        )
+        far = _turned(antenna, side, n + 1, angle, _body(antenna, side, n + 2))
+        far = _turned(antenna, side, n, angle, far)
+        where = f"with two hinges at {math.degrees(angle):.0f} deg"
+        yield from between(_body(antenna, side, n), far, where)
 
 
 def spring_checks(antenna: AntennaSolids) -> list[Check]:

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 
 from antennate_build import kernel
-from antennate_build.flange import FLANGE, flange_radius, hinge_height, screw_places
+from antennate_build.flange import FLANGE, PIN_HEAD, flange_radius, hinge_height, screw_places
 from antennate_build.kernel import Solid
 from antennate_build.layout import FOOT, AntennaLayout
 from antennate_build.mounts import Mount
@@ -17,8 +17,6 @@ _TIE = 3.0
 """Length of a floor between the plates [mm]."""
 _WINDOW = 9.0
 """Longest window in a plate [mm]: a bridge while it is printed."""
-PIN_HEAD = 1.2
-"""Thickness of a pin's head [mm]."""
 PRESS = 0.05
 """Hole of the outer arms over the pin [mm]: it sits there, and turns in the inner arms."""
 
@@ -236,7 +234,7 @@ def spring(layout: AntennaLayout, number: int) -> Solid:
     return kernel.coil(body.coil / 2.0, body.wire, body.turns, (body.leg, body.leg))
 
 
-def bracket(layout: AntennaLayout, mount: Mount, roll: float = 0.0, right: bool = False) -> Solid:
+def bracket(layout: AntennaLayout, mount: Mount, turn: float = 0.0) -> Solid:
     """The bracket of an antenna: a flange on the horn of its servo, and the outer arms above it.
 
     The frame is that of the hinge: the antenna leaves along x, the servo turns about z.
@@ -244,21 +242,17 @@ def bracket(layout: AntennaLayout, mount: Mount, roll: float = 0.0, right: bool 
     Args:
         layout: Sizes.
         mount: The servo.
-        roll: Turn of the plane in which the antenna bends [rad].
-        right: Whether it carries the right antenna, which is the left one turned by half a turn.
+        turn: Turn of the antenna about its own axis [rad]: its roll, and half a turn if it hangs.
     """
-    hinge, height = layout.hinge, hinge_height(layout, mount, roll)
+    hinge, height = layout.hinge, hinge_height(layout, mount, layout.antenna.roll)
     back, front = _column(layout, mount)
-    fork = _fork(layout, mount)
-    fork = kernel.turned(fork, -roll if right else roll, "x")
-    if right:
-        fork = kernel.turned(fork, math.pi, "x")
+    fork = kernel.turned(_fork(layout, mount), turn, "x")
     flange = _flange(layout, mount, back, height)
     column = kernel.block((back, front), (layout.low, hinge.lug), (-height, 0))
-    if right:
+    if math.cos(turn) < 0.0:
         column = kernel.mirrored(column, "y")
     whole = kernel.joined(fork, column, flange)
-    return kernel.cut(whole, *_screw_holes(mount, height, roll))
+    return kernel.cut(whole, *_screw_holes(mount, height, layout.antenna.roll))
 
 
 def _column(layout: AntennaLayout, mount: Mount) -> tuple[float, float]:

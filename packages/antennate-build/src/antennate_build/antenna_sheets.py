@@ -106,7 +106,7 @@ def _whole_sizes(antenna: AntennaSolids, above: View, side: View) -> None:
     above.length((0, high, 0), (end, high, 0), (0, 14), f"{end:.1f}")
     above.length((0, high, 0), (layout.length, high, 0), (0, 7), f"{layout.length:.1f}")
     above.length((end, layout.low, 0), (end, high, 0), (9, 0), f"{high - layout.low:.1f}")
-    low = -flange.hinge_height(layout, antenna.mount, antenna.roll)
+    low = -flange.hinge_height(layout, antenna.mount, layout.antenna.roll)
     side.length((end, 0, -hinge.half), (end, 0, hinge.half), (9, 0), f"{2 * hinge.half:.1f}")
     back = -flange.flange_radius(layout, antenna.mount) - 4.0
     side.length((back, 0, low), (back, 0, 0), (-6, 0), f"{-low:.2f}")
@@ -190,20 +190,20 @@ def _section_table(antenna: AntennaSolids, axes: sheet.Axes) -> None:
 def bracket_sheet(antenna: AntennaSolids) -> Figure:
     """The bracket on the horn of its servo, in three views with its sizes."""
     layout, hinge, mount = antenna.layout, antenna.layout.hinge, antenna.mount
-    name = antenna.sides[0][0]
+    name, _ = antenna.standing
     part = antenna.printed[name]
     scale = 3.0
     horn, screw = mount.horn, mount.horn.screw
     length = flange.SCREW_LENGTH
-    screws = flange.screw_places(mount, antenna.roll)
+    screws = flange.screw_places(mount, layout.antenna.roll)
     notes = (
         f"{scale:g} : 1; {layout.print.material.upper()}; upright on its back",
         f"{len(screws)} {screw.name} x {length:g} into the horn",
         f"horn: {mount.source.partition(';')[0]}",
     )
-    title = "Bracket" if name == "bracket" else "Bracket, left"
+    title = "Bracket" if name == "bracket" else "Bracket, right"
     figure, axes = sheet.new(sheet.A4, title, notes)
-    height = flange.hinge_height(layout, mount, antenna.roll)
+    height = flange.hinge_height(layout, mount, layout.antenna.roll)
     above = View(axes, (80.0, 160.0), scale, *TOP)
     above.draw(part, hidden=True)
     side = View(axes, (80.0, 84.0), scale, *SIDE)

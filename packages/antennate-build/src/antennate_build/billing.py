@@ -125,7 +125,7 @@ def antenna_items(antenna: AntennaSolids, antennae: int) -> list[Item]:
     width, thickness, length = STRIPS[kind]
     what = "flex sensor" if kind == "flex" else "pressure strip"
     known = "Spectra Symbol FS-L-0095-103" if kind == "flex" else "ZD10-100"
-    screws = len(flange.screw_places(mount, antenna.roll))
+    screws = len(flange.screw_places(mount, layout.antenna.roll))
     screw = f"{mount.horn.screw.name} x {flange.SCREW_LENGTH:g}"
     return [
         Item(

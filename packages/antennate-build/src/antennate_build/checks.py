@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 import trimesh
@@ -102,7 +102,8 @@ def printed(solid: Solid, up: Up, wall: float, tolerance: float = 0.02) -> Print
 
 def stl(mesh: kernel.Mesh) -> bytes:
     """A binary STL file [mm]."""
-    return bytes(trimesh.Trimesh(mesh.points, mesh.triangles).export(file_type="stl"))
+    data: Any = trimesh.Trimesh(mesh.points, mesh.triangles).export(file_type="stl")
+    return bytes(data)
 
 
 def overlap(one: Solid, other: Solid) -> float:

@@ -1,4 +1,4 @@
-"""The flange of an antenna's bracket on the horn of its servo: its size, height and screws, in mm."""
+"""The flange of an antenna's bracket on the horn of a servo: its size, height and screws, in mm."""
 
 from __future__ import annotations
 
@@ -7,6 +7,8 @@ import math
 from antennate_build.layout import AntennaLayout
 from antennate_build.mounts import Mount
 
+PIN_HEAD = 1.2
+"""Thickness of a pin's head [mm]."""
 FLANGE = 2.0
 """Thickness of the bracket's flange on the horn [mm]: a screw M2 x 4 then bites 2 mm."""
 SCREW_LENGTH = 4.0
@@ -18,25 +20,33 @@ _HEAD_ROOM = 0.6
 def hinge_height(layout: AntennaLayout, mount: Mount, roll: float) -> float:
     """Height of the first hinge above the face of the horn [mm].
 
-    The first segment must pass above flange and screws at every angle of its hinge. `roll` turns
-    the plane in which it bends about the antenna's own axis [rad].
+    The first segments must pass above flange and screws at every angle of their hinge, on either
+    side of the robot. `roll` turns the plane in which they bend about the antenna's own axis [rad].
     """
-    hinge, radius = layout.hinge, flange_radius(layout, mount)
     above = FLANGE + mount.horn.screw.head_height + _HEAD_ROOM
-    lowest = 0.0
-    sides = (layout.low, layout.strip.top)
+    radius, turns = flange_radius(layout, mount) + 2.0, {roll, -roll, roll + math.pi}
+    return above - min(_lowest(layout, turn, radius) for turn in turns)
+
+
+def _lowest(layout: AntennaLayout, turn: float, radius: float) -> float:
+    """How far two segments reach below the hinge within a radius about the shaft."""
+    hinge, lowest = layout.hinge, 0.0
+    corners = [
+        (x, y, z)
+        for x in (0.0, *(layout.length * k / 8.0 for k in range(1, 17)))
+        for y in (layout.low, layout.strip.top)
+        for z in (-hinge.half, hinge.half + PIN_HEAD)
+    ]
     for n in range(-20, 21):
         angle = hinge.stop * n / 20.0
-        for y in sides:
-            for z in (-hinge.half, hinge.half):
-                for x in (0.0, *(layout.length * k / 8.0 for k in range(1, 17))):
-                    along = x * math.cos(angle) - y * math.sin(angle)
-                    across = x * math.sin(angle) + y * math.cos(angle)
-                    left = across * math.cos(roll) - z * math.sin(roll)
-                    up = across * math.sin(roll) + z * math.cos(roll)
-                    if math.hypot(along, left) <= radius + 2.0:
-                        lowest = min(lowest, up)
-    return above - lowest
+        for x, y, z in corners:
+            along = x * math.cos(angle) - y * math.sin(angle)
+            across = x * math.sin(angle) + y * math.cos(angle)
+            left = across * math.cos(turn) - z * math.sin(turn)
+            up = across * math.sin(turn) + z * math.cos(turn)
+            if math.hypot(along, left) <= radius:
+                lowest = min(lowest, up)
+    return lowest
 
 
 def flange_radius(layout: AntennaLayout, mount: Mount) -> float:

@@ -144,8 +144,8 @@ def _require_room(layout: LinkLayout) -> None:
         least = 1e-3 * (layout.pitch_length + used)
         raise ConfigError(
             f"robot.link_pitch: expected at least {math.ceil(1e3 * least) / 1e3:g} m for links "
-            f"with a servo of {yaw.length:g} mm for yaw{' and one for pitch' * bool(layout.pitch)}, "
-            f"found {robot.link_pitch:g} m"
+            f"with a servo of {yaw.length:g} mm for yaw"
+            f"{' and one for pitch' * bool(layout.pitch)}, found {robot.link_pitch:g} m"
         )
     inside = max(yaw.x, layout.pitch.horn.top if layout.pitch else 0.0) + PLATE + 1.0
     if layout.wall - PLATE < inside:
@@ -159,6 +159,6 @@ def _require_room(layout: LinkLayout) -> None:
     if 1e3 * robot.leg_eccentricity + hub > 1e3 * robot.leg_radius - TREAD:
         raise ConfigError(
             f"robot.leg_radius: expected a ring that holds the horn {hub:.1f} mm in radius, "
-            f"{1e3 * robot.leg_eccentricity:g} mm off its middle, found {robot.leg_radius:g} m with "
-            f"{inner:.1f} mm inside"
+            f"{1e3 * robot.leg_eccentricity:g} mm off its middle, found {robot.leg_radius:g} m "
+            f"with {inner:.1f} mm inside"
         )

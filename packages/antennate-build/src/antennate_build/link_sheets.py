@@ -6,6 +6,7 @@ from matplotlib.figure import Figure
 
 from antennate import figures as style
 from antennate_build import kernel, sheet
+from antennate_build.checks import Named
 from antennate_build.link_layout import PLATE
 from antennate_build.robot_assembly import RobotSolids
 from antennate_build.sheet import View
@@ -37,7 +38,7 @@ def link_sheet(robot: RobotSolids) -> Figure:
     notes = (
         "1 : 1.33; servos grey",
         f"{layout.print.material.upper()}, plates {PLATE:g}",
-        f"holes: {layout.leg.source}",
+        f"holes: {layout.leg.source.partition(';')[0]}",
     )
     figure, axes = sheet.new(sheet.A3, "Link", notes)
     scale, number = 0.75, min(1, spec.links - 1)
@@ -61,7 +62,7 @@ def link_sheet(robot: RobotSolids) -> Figure:
         (-half, -out, 0), (half, -out, 0), (0, -14), f"{layout.pitch_length:g} from joint to joint"
     )
     above.length((half, -out, 0), (half, out, 0), (26, 0), f"{2 * out:g}")
-    above.length((layout.axis, 0, 0), (0, 0, 0), (0, 62), f"{layout.axis:.1f} to the yaw axis")
+    above.length((layout.axis, 0, 0), (0, 0, 0), (0, 38), f"{layout.axis:.1f} to the yaw axis")
     side.length(
         (half + 12, 0, layout.floor),
         (half + 12, 0, layout.leg.x),
@@ -81,8 +82,8 @@ def link_sheet(robot: RobotSolids) -> Figure:
     return figure
 
 
-def shaded(robot: RobotSolids) -> Figure:
-    """The robot as one sees it, straight, without antennae."""
+def shaded(parts: list[Named]) -> Figure:
+    """The robot as one sees it, straight."""
     view, figure = sheet.picture(9.0, 5.0, ((0.55, 0.6, 0.6), (0.0, 0.0, 1.0)))
-    view.scene([(solid, colour(name)) for name, solid in robot.whole()])
+    view.scene([(solid, colour(name)) for name, solid in parts])
     return figure

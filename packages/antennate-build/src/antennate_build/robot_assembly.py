@@ -1,4 +1,4 @@
-"""A robot put together: where parts and servos of its links stand, and what meets at which angle."""
+"""A robot put together: where parts and servos of its links stand, and what meets when."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from functools import cached_property
 import numpy as np
 
 from antennate_build import checks, kernel, link_parts
+from antennate_build.antenna_assembly import AntennaSolids
 from antennate_build.checks import Check, Meeting, Named, Up
 from antennate_build.kernel import Solid
 from antennate_build.link_layout import LinkLayout, part_names
@@ -164,6 +165,35 @@ def _upright(servo: Solid, mount: Mount, forward: bool = False) -> Solid:
     """A servo whose shaft points to the left, its case backward, or forward."""
     solid = kernel.turned(servo, -QUARTER, "x")
     return kernel.turned(solid, QUARTER if forward else -QUARTER, "y")
+
+
+def at_head(robot: RobotSolids, antenna: AntennaSolids, turn: float = 0.0) -> list[Named]:
+    """Both antennae, straight, in the frame of the head.
+
+    Args:
+        robot: The links.
+        antenna: The antenna.
+        turn: Angle of both bases from their mounting angle, outwards [rad].
+    """
+    spec = robot.layout.robot
+    place, apart = 500.0 * spec.link_pitch, 500.0 * spec.antenna.base_spacing
+    parts: list[Named] = []
+    for side, sign in ((0, 1.0), (1, -1.0)):
+        hung = antenna.hung(side, sign * (spec.antenna.base_angle + turn))
+        where = (place, sign * apart, 0.0)
+        parts += [(part.part, kernel.moved(part.solid, where)) for part in hung]
+    return parts
+
+
+def base_check(robot: RobotSolids, antenna: AntennaSolids) -> Check:
+    """Antennae and head at every angle of the base servos."""
+    limit, head = robot.layout.robot.antennae.limit, robot.link(0)
+    meetings: list[Meeting] = []
+    for turn in np.linspace(-limit, limit, YAWS):
+        where = f"at {math.degrees(turn):.0f} deg"
+        meetings += checks.between(head, at_head(robot, antenna, float(turn)), where)
+    name = f"antennae and head, bases up to {math.degrees(limit):.0f} deg either way"
+    return checks.judged(name, meetings)
 
 
 def robot_checks(robot: RobotSolids, tick: Callable[[], object]) -> list[Check]:

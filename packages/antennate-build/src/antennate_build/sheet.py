@@ -320,7 +320,7 @@ def balloon(axes: Axes, start: Place, end: Place, words: str) -> None:
     axes.plot(*a, "o", color=style.INK, ms=2)
     turns = np.linspace(0.0, math.tau, 40)
     circle = b + 3.2 * np.stack([np.cos(turns), np.sin(turns)], -1)
-    axes.fill(*circle.T, facecolor="white", edgecolor=style.INK, lw=0.7, zorder=5)
+    axes.fill(circle[:, 0], circle[:, 1], facecolor="white", edgecolor=style.INK, lw=0.7, zorder=5)
     text(axes, end, words, side="center", weight="bold", zorder=6)
 
 

@@ -10,10 +10,10 @@ from antennate_build.link_layout import LinkLayout
 from antennate_build.mounts import Mount
 
 
-def antenna_steps(layout: AntennaLayout, mount: Mount, roll: float = 0.0) -> tuple[str, ...]:
+def antenna_steps(layout: AntennaLayout, mount: Mount) -> tuple[str, ...]:
     """Steps from printed parts and springs to an antenna on its servo."""
     hinge, count = layout.hinge, layout.antenna.hinges
-    screws = len(flange.screw_places(mount, roll))
+    screws = len(flange.screw_places(mount, layout.antenna.roll))
     screw = mount.horn.screw.name.partition(" M")[2]
     thickness = STRIPS[layout.antenna.sensor.kind][1]
     sensor = "flex sensor" if layout.antenna.sensor.kind == "flex" else "pressure strip"
@@ -60,11 +60,10 @@ def link_steps(layout: LinkLayout, base: Mount | None) -> tuple[str, ...]:
         ()
         if base is None
         else (
-            "Screw both base servos into the head plate, horns down, and bolt the plate to the front "
-            "wall of the head with eight M3 x 10. The brackets of the antennae come below: "
-            "bracket_right left, bracket_left right, as they hang upside down.",
-            "Lay ESP32 and converter into the cabin; its flaps go under the upper screws of the leg "
-            "servos of the head, which are 8 mm long there.",
+            "Screw both base servos into the head plate, horns down, and bolt the plate to the "
+            "front wall of the head with eight M3 x 10. The antennae hang below, upside down.",
+            "Lay ESP32 and converter into the cabin; its flaps go under the upper screws of the "
+            "leg servos of the head, which are 8 mm long there.",
         )
     )
     return (

@@ -7,13 +7,15 @@ second crossing of the line with the mesh.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
-from scipy import ndimage
+from scipy import ndimage as _ndimage
 
 from antennate.types import Bools, Floats
 from antennate_build.kernel import Mesh
 
+ndimage: Any = _ndimage  # its types do not say what its functions return
 LONGEST_BRIDGE = 12.0
 """Longest gap that is bridged in the air [mm] (assumed: what printers of plastic wire manage)."""
 _LEDGE = 0.6

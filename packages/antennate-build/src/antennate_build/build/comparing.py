@@ -43,7 +43,7 @@ def antenna_masses(antenna: AntennaSolids) -> dict[str, Compared]:
     )
     return {
         "antenna's mass": compared("g", 1e3 * spec.mass, sum(links) + bracket),
-        "link's mass, mean": compared("g", 1e3 * spec.link_mass, sum(links) / len(links)),
+        "antenna link's mass, mean": compared("g", 1e3 * spec.link_mass, sum(links) / len(links)),
         "bracket's mass": compared("g", 1e3 * spec.base_mass, bracket),
         "antenna's inertia about its base": compared("g·mm²", rods, inertia),
     }
@@ -73,7 +73,7 @@ def robot_masses(
     link = 2.0 * GRAMS[spec.legs.servo] + sum(GRAMS[name] for name in carried)
     link += grams.get("frame", grams["frame_tail"]) + grams["hinge"] + grams.get("hinge_pitch", 0)
     return {
-        "robot without battery, boards, cables": compared(
+        "robot's mass without battery, boards and cables": compared(
             "g", 1e3 * spec.mass, servos + printed + pair
         ),
         "link between two others": compared("g", 1e3 * spec.link_mass, link),

@@ -79,16 +79,16 @@ def made(
         done += 1
         on_step(done, max(done + 1, 40))
 
+    antenna = None
     if found is not None:
         layout, mount = found
-        roll = config.robot.antenna.roll
-        antenna = AntennaSolids(layout, mount, roll, brackets(config))
+        antenna = AntennaSolids(layout, mount, brackets(config))
         _add_antenna(product, config, antenna, tick)
         springs = _springs(antenna)
     if (links := links_of(config)) is not None:
         layout, horn = links
         robot = RobotSolids(layout, None if found is None else found[1], horn)
-        _add_links(product, config, robot, tick)
+        _add_links(product, config, robot, antenna, tick)
     prints, files = _printed(product, config, tick)
     result = BuildResult(
         parts=prints,
@@ -117,12 +117,12 @@ def _add_antenna(
         product.counts[name] = antenna.counts[name] * (1 if name.startswith("bracket") else pair)
         product.ups[name] = antenna_checks.up_of(name)
         tick()
-    placed = antenna.placed()
-    product.placed |= {part.name: part.solid for part in placed}
+    if config.what == "antenna":
+        product.placed = {part.name: part.solid for part in antenna.placed()}
     product.checks.append(antenna_checks.assembly_check(antenna, tick))
     product.checks += antenna_checks.spring_checks(antenna)
     product.masses |= antenna_masses(antenna)
-    said = steps.antenna_steps(layout, mount, antenna.roll)
+    said = steps.antenna_steps(layout, mount)
     product.steps["Antenna"] = said
     product.figures |= {
         "antenna": antenna_sheets.antenna_sheet(antenna),
@@ -138,14 +138,22 @@ def _add_antenna(
 
 
 def _add_links(
-    product: Product, config: BuildConfig, robot: RobotSolids, tick: Callable[[], None]
+    product: Product,
+    config: BuildConfig,
+    robot: RobotSolids,
+    antenna: AntennaSolids | None,
+    tick: Callable[[], None],
 ) -> None:
+    whole = robot.whole()
+    if antenna is not None:
+        whole += robot_assembly.at_head(robot, antenna)
+        product.checks.append(robot_assembly.base_check(robot, antenna))
     for name, solid in robot.printed.items():
         product.parts[name] = solid
         product.counts[name] = robot.counts[name]
         product.ups[name] = robot_assembly.up_of(name)
         tick()
-    for n, (name, solid) in enumerate(robot.whole()):
+    for n, (name, solid) in enumerate(whole):
         product.placed[f"{name} {n + 1}"] = solid
     product.checks += robot_assembly.robot_checks(robot, tick)
     grams = {name: config.print.density * kernel.volume(s) for name, s in robot.printed.items()}
@@ -153,7 +161,7 @@ def _add_links(
     product.steps["Links"] = steps.link_steps(robot.layout, robot.base)
     product.figures |= {
         "link": link_sheets.link_sheet(robot),
-        "robot": link_sheets.shaded(robot),
+        "robot": link_sheets.shaded(whole),
     }
     product.items += billing.printed_items(robot.counts, grams, config.print.material)
     product.items += billing.link_items(robot)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from antennate_build.build.config import BuildConfig
 from antennate_build.flange import hinge_height
 from antennate_build.layout import AntennaLayout, layout_of, segment_names
@@ -38,11 +40,15 @@ def links_of(config: BuildConfig) -> tuple[LinkLayout, float] | None:
     return link_layout(config.robot, config.print, head), horn
 
 
-def brackets(config: BuildConfig) -> tuple[tuple[str, bool], ...]:
-    """Brackets of the antennae, and whether each is the right one."""
+def brackets(config: BuildConfig) -> tuple[tuple[str, float], ...]:
+    """Brackets of the antennae, and how each turns its antenna about its own axis [rad].
+
+    On a robot both hang upside down, so each bracket turns its antenna by half a turn more.
+    """
+    roll = config.robot.antenna.roll
     if config.what == "antenna":
-        return (("bracket", False),)
-    return (("bracket_left", False), ("bracket_right", True))
+        return (("bracket", roll),)
+    return (("bracket_left", math.pi + roll), ("bracket_right", -roll))
 
 
 def part_names(config: BuildConfig) -> tuple[str, ...]:
