@@ -207,12 +207,16 @@ def test_a_policy_is_called_by_folder_or_file_and_a_long_name_is_cut_in_the_midd
 def test_a_missing_extra_is_told_as_pip_and_uv_take_it() -> None:
     """docs/install.md says how extras are installed: the package is on no index."""
     pages = (ROOT / "docs" / "install.md").read_text()
-    own, laboratory, together = (
+    own, laboratory, parts, together = (
         tomllib.loads((folder / "pyproject.toml").read_text())["project"]["optional-dependencies"]
-        for folder in (ROOT / "packages" / "antennate", ROOT / "packages" / "antennate-lab", ROOT)
+        for folder in (
+            *(ROOT / "packages" / name for name in ("antennate", "antennate-lab")),
+            *(ROOT / "packages" / "antennate-build", ROOT),
+        )
     )
     assert together == {name: [f"antennate[{name}]"] for name in own} | {
-        name: [f"antennate-lab[{name}]"] for name in laboratory
+        **{name: [f"antennate-lab[{name}]"] for name in laboratory},
+        **{name: [f"antennate-build[{name}]"] for name in parts},
     }
     named = set()
     for file in sorted((ROOT / "packages" / "antennate" / "src").rglob("*.py")):
@@ -229,7 +233,7 @@ def test_the_page_names_the_extras_that_the_locked_versions_leave_out() -> None:
     lock = (ROOT / "requirements.lock").read_text()
     locked = {name.lower() for name in re.findall(r"^([\w.-]+)==", lock, re.MULTILINE)}
     left_out = set()
-    for name in ("antennate", "antennate-lab"):
+    for name in ("antennate", "antennate-build", "antennate-lab"):
         project = tomllib.loads((ROOT / "packages" / name / "pyproject.toml").read_text())[
             "project"
         ]

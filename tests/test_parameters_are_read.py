@@ -274,6 +274,18 @@ TINY: dict[str, list[dict[str, Any]]] = {
     ],
     "fit": [{"log": ["small.mcap"], "robot": "small.toml", "robots": 20, "seed": 1}],
     "reproduce": [{"quick": True}],
+    "build": [
+        {
+            "robot": {
+                "links": 2,
+                "pitch": {"kind": kind},
+                "elevation": {"kind": "pair"},
+                "imu": {"kind": "head"},
+                "antenna": {"active_coils": [3.0, 6.0], "length": 0.04, "sensor": sensor},
+            }
+        }
+        for kind, sensor in (("locked", {"active_length": 0.03}), ("actuated", {}))
+    ],
 }
 PARTS = {"antenna": {}, "calibrate": {"rig": {"pushes": 2, "speeds": [0.3]}}}
 """All that `reproduce` runs here."""
@@ -281,7 +293,7 @@ PARTS = {"antenna": {}, "calibrate": {"rig": {"pushes": 2, "speeds": [0.3]}}}
 
 MARKS = {
     **dict.fromkeys(("geometry", "climb", "dataset", "sweep"), pytest.mark.slow),
-    **dict.fromkeys(("compete", "tunnel", "fit"), pytest.mark.ci),
+    **dict.fromkeys(("compete", "tunnel", "fit", "build"), pytest.mark.ci),
 }
 
 
@@ -291,6 +303,8 @@ def test_every_parameter_of_an_experiment_is_read_or_refused(
 ) -> None:
     if name == "study":
         pytest.importorskip("optuna", reason="the extra `design` is not installed")
+    if name == "build":
+        pytest.importorskip("build123d", reason="the extra `build` is not installed")
     monkeypatch.chdir(tmp_path)
     Path("recording.csv").write_text(RECORDING)
     told = of_twin(Path("servo.json"), 1200, 400, 0.5, 1.5).read_text()

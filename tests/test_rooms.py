@@ -15,10 +15,11 @@ from pathlib import Path
 import pytest
 
 import antennate
+import antennate_build
 import antennate_lab
 import dynamixel_bus
 import geometric_locomotion
-from antennate.experiments import GROUP, LABORATORY
+from antennate.experiments import ELSEWHERE, GROUP
 
 ROOT = Path(__file__).parents[1]
 ROOMS = {
@@ -28,6 +29,7 @@ ROOMS = {
 """Distributions that need none of ours, and all that is in an environment with one of them."""
 UPPER = {
     "antennate": {*ROOMS},
+    "antennate-build": {"antennate"},
     "antennate-lab": {*ROOMS, "antennate"},
 }
 """Distributions that need others of ours, and those."""
@@ -150,7 +152,7 @@ def test_imports_go_down_in_the_table_of_layers() -> None:
 def test_all_have_one_version() -> None:
     """The version of `antennate` is that of the others, which it asks for."""
     version = antennate.__version__
-    assert antennate_lab.__version__ == version
+    assert antennate_lab.__version__ == antennate_build.__version__ == version
     assert dynamixel_bus.__version__ == geometric_locomotion.__version__ == version
     assert {path.name for path in (ROOT / "packages").iterdir()} == {*ROOMS, *UPPER}
 
@@ -162,10 +164,13 @@ def test_one_asks_for_the_others_that_it_needs_in_that_version(room: str) -> Non
     assert needed == {f"{other}=={antennate.__version__}" for other in UPPER[room]}
 
 
-def test_the_experiments_of_the_laboratory_are_named_where_it_is_missed() -> None:
-    text = (ROOT / "packages" / "antennate-lab" / "pyproject.toml").read_text()
-    entries = tomllib.loads(text)["project"]["entry-points"][GROUP]
-    assert sorted(LABORATORY) == sorted(entries)
+def test_experiments_of_other_distributions_are_named_where_these_are_missed() -> None:
+    found = {}
+    for room in ("antennate-lab", "antennate-build"):
+        text = (ROOT / "packages" / room / "pyproject.toml").read_text()
+        entries = tomllib.loads(text)["project"]["entry-points"][GROUP]
+        found |= dict.fromkeys(entries, room)
+    assert found == ELSEWHERE
 
 
 @pytest.mark.parametrize("room", [*ROOMS, *UPPER])
@@ -221,14 +226,22 @@ def test_one_alone_runs_its_first_example(room: str, kind: str, uv: str, tmp_pat
 
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", ["whl", "tar.gz"])
-@pytest.mark.parametrize(("room", "expected"), [("antennate", "success"), ("antennate-lab", "m/s")])
+@pytest.mark.parametrize(
+    ("room", "expected"),
+    [
+        ("antennate", "success"),
+        ("antennate-lab", "m/s"),
+        ("antennate-build", "3 turns of 0.50 mm: -0.7 %"),
+    ],
+)
 def test_one_runs_its_first_example_beside_those_that_it_needs(
     room: str, expected: str, kind: str, uv: str, tmp_path: Path
 ) -> None:
     built, folder = tmp_path / "built", ROOT / "packages" / room
     done(uv, "build", "--wheel" if kind == "whl" else "--sdist", folder, "--out-dir", built)
     (file,) = built.glob(f"{room.replace('-', '_')}-*.{kind}")
-    others = [ROOT / "packages" / other for other in UPPER[room]]
+    needed = UPPER[room] | set(ROOMS)
+    others = [ROOT / "packages" / other for other in needed]
     programs = environment(uv, tmp_path / "alone", file, *others)
     script = tmp_path / "example.py"
     script.write_text(first_example(room))

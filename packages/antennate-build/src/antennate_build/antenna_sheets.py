@@ -192,12 +192,13 @@ def bracket_sheet(antenna: AntennaSolids) -> Figure:
     layout, hinge, mount = antenna.layout, antenna.layout.hinge, antenna.mount
     name, _ = antenna.standing
     part = antenna.printed[name]
-    scale = 3.0
+    tall = kernel.bounds(part)[1][2] - kernel.bounds(part)[0][2]
+    scale = min(3.0, 48.0 / tall)
     horn, screw = mount.horn, mount.horn.screw
     length = flange.SCREW_LENGTH
     screws = flange.screw_places(mount, layout.antenna.roll)
     notes = (
-        f"{scale:g} : 1; {layout.print.material.upper()}; upright on its back",
+        f"{scale:.2g} : 1; {layout.print.material.upper()}; upright on its back",
         f"{len(screws)} {screw.name} x {length:g} into the horn",
         f"horn: {mount.source.partition(';')[0]}",
     )

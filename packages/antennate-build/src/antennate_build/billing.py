@@ -98,7 +98,8 @@ def printed_items(
             count,
             name,
             "printed",
-            f"stl/{name}.stl, {material.upper()}, layers of 0.15 mm, solid",
+            f"stl/{name}.stl, {'TPU' if name == 'tread' else material.upper()}, layers of 0.15 mm, "
+            "solid",
             round(grams[name], 3),
         )
         for name, count in counts.items()
@@ -119,7 +120,7 @@ def as_csv(items: list[Item]) -> str:
 
 
 def antenna_items(antenna: AntennaSolids, antennae: int) -> list[Item]:
-    """What else some antennae take: sensors, screws of their brackets, glue."""
+    """What else some antennae take: screws of their brackets, and the sensor of one alone."""
     layout, mount = antenna.layout, antenna.mount
     kind = layout.antenna.sensor.kind
     width, thickness, length = STRIPS[kind]
@@ -127,15 +128,9 @@ def antenna_items(antenna: AntennaSolids, antennae: int) -> list[Item]:
     known = "Spectra Symbol FS-L-0095-103" if kind == "flex" else "ZD10-100"
     screws = len(flange.screw_places(mount, layout.antenna.roll))
     screw = f"{mount.horn.screw.name} x {flange.SCREW_LENGTH:g}"
-    return [
-        Item(
-            antennae,
-            what,
-            "along each antenna",
-            f"{known}, {width:g} x {thickness:g} x {length:g} mm",
-        ),
-        Item(antennae * screws, screw, "bracket to horn", f"{screw}, pan head"),
-    ]
+    size = f"{known}, {width:g} x {thickness:g} x {length:g} mm"
+    alone = [Item(1, what, "along the antenna", size)] if antennae == 1 else []
+    return [*alone, Item(antennae * screws, screw, "bracket to horn", "pan head")]
 
 
 def link_items(robot: RobotSolids) -> list[Item]:

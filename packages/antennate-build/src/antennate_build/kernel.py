@@ -10,10 +10,10 @@ import math
 import tempfile
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from importlib import import_module
 from pathlib import Path
 from typing import Any, Literal
 
+import build123d  # pyright: ignore[reportMissingImports]
 import numpy as np
 from OCP.BRepTools import (  # pyright: ignore[reportMissingImports]
     BRepTools,  # pyright: ignore[reportAttributeAccessIssue]
@@ -21,7 +21,7 @@ from OCP.BRepTools import (  # pyright: ignore[reportMissingImports]
 
 from antennate.types import Floats
 
-bd: Any = import_module("build123d")  # its types do not say what its functions take
+bd: Any = build123d  # its types do not say what its functions take
 Solid = Any
 """A solid of the kernel, or some of them."""
 Point = tuple[float, float, float]

@@ -139,7 +139,7 @@ def _require_room(layout: LinkLayout) -> None:
     """Refuse links whose servos do not fit."""
     robot, yaw, leg = layout.robot, layout.yaw, layout.leg
     rear = layout.rear - (layout.pitch.y[0] if layout.pitch else -layout.reach - 2.0 * PLATE)
-    used = rear - (layout.axis + yaw.y[0]) + 1.0
+    used = rear - (layout.axis + yaw.y[0] - PLATE) + 1.0
     if used > 0.0:
         least = 1e-3 * (layout.pitch_length + used)
         raise ConfigError(

@@ -284,7 +284,8 @@ def dimension(axes: Axes, a: Floats, b: Floats, shift: Floats, words: str) -> No
     lift = np.array([-math.sin(math.radians(turn)), math.cos(math.radians(turn))]) * 1.9
     middle = (first + last) / 2.0 + lift
     axes.text(
-        *middle,
+        float(middle[0]),
+        float(middle[1]),
         words,
         fontsize=LETTER * _POINTS,
         ha="center",

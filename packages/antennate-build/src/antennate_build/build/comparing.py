@@ -7,6 +7,8 @@ from collections.abc import Mapping
 from antennate.robots.spec import RobotSpec
 from antennate_build import kernel
 from antennate_build.antenna_assembly import AntennaSolids
+from antennate_build.build.config import BuildConfig
+from antennate_build.build.naming import antenna_of, links_of
 from antennate_build.build.result import Compared
 from antennate_build.mounts import GRAMS
 from antennate_build.robot_assembly import RobotSolids
@@ -79,3 +81,28 @@ def robot_masses(
         "link between two others": compared("g", 1e3 * spec.link_mass, link),
         "leg's mass": compared("g", 1e3 * spec.leg_mass, leg),
     }
+
+
+def apart(config: BuildConfig) -> list[str]:
+    """Where the parts are not what is simulated, in sentences."""
+    robot, told = config.robot, list[str]()
+    if (found := antenna_of(config)) is not None:
+        layout, _ = found
+        high, wide = 2.0 * layout.hinge.half, layout.strip.top - layout.low
+        told.append(
+            f"Antenna: {high:.1f} mm high and {wide:.1f} mm wide, simulated as rods of "
+            f"{2e3 * robot.antenna.radius:g} mm."
+        )
+    links = links_of(config)
+    if links is not None and links[0].pitch is not None:
+        offset = 1e3 * robot.link_pitch - (links[0].axis - links[0].rear)
+        told.append(
+            f"Joints: the axes of yaw and pitch stand {offset:.1f} mm apart, simulated in one "
+            "point."
+        )
+    if links is not None and robot.elevation_count:
+        told.append(
+            "Elevation: no part is made for the joints that raise the antennae; the base servos "
+            "sit in the head plate."
+        )
+    return told

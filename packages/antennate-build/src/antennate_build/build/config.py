@@ -11,7 +11,14 @@ from pydantic import model_validator
 from antennate.errors import MissingPackageError
 from antennate.files import read_toml
 from antennate.messages import extra
-from antennate.params.base import LARGEST_FILE, Params, from_values, number, read_file
+from antennate.params.base import (
+    LARGEST_FILE,
+    Params,
+    from_values,
+    number,
+    paths_of,
+    read_file,
+)
 from antennate.robots.antenna import AntennaSpec
 from antennate.robots.spec import ROBOTS, RobotSpec
 from antennate_build.printing import PrintParams
@@ -20,10 +27,34 @@ from antennate_build.winding import WireParams
 _PACKAGES = {"build123d": "build123d", "trimesh": "trimesh"}
 
 
+_READ = {
+    f"robot.{name}"
+    for name in (
+        *("baud", "leg_eccentricity", "leg_mass", "leg_radius", "leg_width", "link_pitch"),
+        *("links", "mass", "width", "imu.kind", "legs.kind", "pitch.kind", "pitch.limit"),
+        *("yaw.limit", "antennae.kind", "antennae.limit", "elevation.kind", "elevation.mass"),
+        *(f"{group}.ids" for group in ("yaw", "legs", "antennae", "pitch", "elevation")),
+        *(f"{group}.servo" for group in ("yaw", "legs", "antennae", "pitch", "elevation")),
+        *(
+            f"antenna.{name}"
+            for name in (
+                *("active_coils", "three_coil_stiffness_n_mm_per_deg", "length", "radius"),
+                *("link_mass", "base_mass", "range", "base_angle", "roll", "base_spacing"),
+                *("sensor.active_length", "sensor.kind", "sensor.divider_resistance"),
+            )
+        ),
+    )
+}
+"""Parameters of a robot that parts, their masses and the bill depend on."""
+
+
 class BuildConfig(Params):
     """What is built, of which wire, and how it is printed."""
 
-    unread: ClassVar[tuple[str, ...]] = tuple(f"springs.{name}" for name in WireParams.unread)
+    unread: ClassVar[tuple[str, ...]] = (
+        *(path for path in paths_of(RobotSpec, "robot") if path not in _READ),
+        *(f"springs.{name}" for name in WireParams.unread),
+    )
     what: Literal["robot", "antenna"] = number("robot", "1", "assumed: all of it")
     """Whether the whole robot is built, or one antenna."""
     robot: RobotSpec = RobotSpec()

@@ -41,8 +41,8 @@ def run(config: BuildConfig, on_step: Callable[[int, int], None]) -> BuildOutcom
 
 def settled(config: BuildConfig, folder: Path | None) -> BuildConfig:
     """The configuration, after whatever would refuse it at the end has been asked."""
-    require_kernel()
     file_names(config)
+    require_kernel()
     return config
 
 
@@ -65,6 +65,7 @@ def tables(result: BuildResult) -> Sequence[Table]:
         Table.lines(
             "Specification and parts",
             {f"{name} [{each.unit}]": each for name, each in result.masses.items()},
+            note="\n".join(result.apart),
         )
     )
     checks = [(check.name, ["ok" if check.good else "NOT OK"]) for check in result.checks]

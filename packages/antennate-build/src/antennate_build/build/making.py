@@ -21,7 +21,7 @@ from antennate_build import (
     steps,
 )
 from antennate_build.antenna_assembly import AntennaSolids
-from antennate_build.build.comparing import antenna_masses, robot_masses
+from antennate_build.build.comparing import antenna_masses, apart, robot_masses
 from antennate_build.build.config import BuildConfig
 from antennate_build.build.naming import antenna_of, brackets, links_of, sheet_names
 from antennate_build.build.result import (
@@ -95,6 +95,7 @@ def made(
         springs=springs,
         checks=[Checked(name=c.name, found=c.found, good=c.good) for c in product.checks],
         masses=product.masses,
+        apart=apart(config),
     )
     files["step/assembly.step"] = kernel.step(product.placed)
     files["assembly.md"] = "\n".join(

@@ -93,6 +93,8 @@ class BuildResult:
     """What was checked."""
     masses: dict[str, Compared]
     """Masses and inertias of the specification and of the parts."""
+    apart: list[str]
+    """Where the parts are not what is simulated."""
 
     @property
     def failed(self) -> bool:

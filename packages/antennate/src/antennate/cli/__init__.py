@@ -58,7 +58,7 @@ _GROUPS = {
 _FIRST = ("tunnel", "calibrate", "study", "twin", "drive")
 _EXPERIMENTS = (
     *("tunnel", "compete", "gait", "geometry", "climb", "calibrate", "bench", "antenna"),
-    *("study", "dataset", "reproduce", "tracks", "servo", "fit"),
+    *("study", "dataset", "reproduce", "tracks", "servo", "fit", "build"),
 )
 """Commands and groups in the order in which they are listed; what else there is comes last."""
 _HELP = {"-h", "--help", "--help-all", "--completion", "--complete"}
@@ -228,12 +228,12 @@ def _refuse_names(name: str, words: Sequence[str]) -> None:
 
 def _unknown(group: str, word: str) -> str:
     """What is said of a word that is no command, or the old name of one."""
-    from antennate.experiments import LABORATORY, unknown
+    from antennate.experiments import ELSEWHERE, unknown
     from antennate.messages import nearest, shortened, typed
 
     if command_words(word) != word:
         return f"{word} is `{typed(word)}` now"
-    if not group and word in LABORATORY:
+    if not group and word in ELSEWHERE:
         return unknown(word)
     known = COMMAND_GROUPS[group] if group else [*_top()]
     choices = f"{nearest(word, known)}, one of {', '.join(known)}"

@@ -297,7 +297,7 @@ def _page(run: RunDirectory, make: Callable[[View], str]) -> str:
     if name in _VIEWS:
         module, _, attribute = _VIEWS[name].partition(":")
         view = getattr(importlib.import_module(f"antennate.cli.{module}"), attribute)
-    elif name in experiments.names() or name in experiments.LABORATORY:
+    elif name in experiments.names() or name in experiments.ELSEWHERE:
         view = experiments.load(name).view
     else:
         raise BadInputError(

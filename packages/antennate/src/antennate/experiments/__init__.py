@@ -26,8 +26,9 @@ if TYPE_CHECKING:
 
 GROUP = "antennate.experiments"
 """Group of the entry points."""
-LABORATORY = ("compete", "gait", "geometry", "dataset", "reproduce", "tracks", "servo", "fit")
-"""Experiments of the distribution `antennate-lab`, which may not be installed."""
+_LABORATORY = ("compete", "gait", "geometry", "dataset", "reproduce", "tracks", "servo", "fit")
+ELSEWHERE = {**dict.fromkeys(_LABORATORY, "antennate-lab"), "build": "antennate-build"}
+"""Distributions of ours that may not be installed, by the names of their experiments."""
 _NAME = re.compile(r"\w[\w-]*")
 FITTED = "fitted"
 """What stands for a file of `fitted`, as in `--config fitted`."""
@@ -102,10 +103,10 @@ def load(name: str) -> Experiment[Any, Any]:
 
 def unknown(name: str) -> str:
     """What is said of a name that no experiment has."""
-    if name in LABORATORY:
+    if name in ELSEWHERE:
         return (
-            f"expected the package antennate-lab, which has {name}, found none; install it with "
-            f"{INSTALLATION}"
+            f"expected the package {ELSEWHERE[name]}, which has {name}, found none; install it "
+            f"with {INSTALLATION}"
         )
     known = names()
     hint = nearest(name, known)
