@@ -84,7 +84,7 @@ def test_the_default_antenna_weighs_within_a_tenth_of_the_simulated_one(tmp_path
     for name in ("antenna", "assembly", "bracket"):
         assert (out / "drawings" / f"{name}.pdf").read_bytes().startswith(b"%PDF")
         assert (out / "figures" / f"{name}.svg").is_file()
-    rows = list(csv.DictReader((out / "bom.csv").open()))
+    rows = list(csv.DictReader((out / "bom.csv").read_text().splitlines()))
     assert {row["cost"] for row in rows} == {""}
     springs = {row["item"]: int(row["count"]) for row in rows if "turns" in row["item"]}
     assert list(springs.values()) == [1, 2, 3]
@@ -99,6 +99,8 @@ def test_a_robot_is_built_and_nothing_meets(robot: str, tmp_path: Path) -> None:
     counts = {name: part["count"] for name, part in result["parts"].items()}
     assert (counts["leg"], counts["hinge"], counts["pin"]) == (12, 5, 12)
     assert ("hinge_pitch" in counts) == (robot == "scuttle3d")
+    told = " ".join(result["apart"])
+    assert ("servo leg_left and segment" in told) == (robot == "scuttle")
 
 
 def mesh_of(solid: kernel.Solid) -> kernel.Mesh:

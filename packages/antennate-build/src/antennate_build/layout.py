@@ -150,7 +150,7 @@ def layout_of(
     Raises:
         ConfigError: Its hinges do not fit: links too short, or stops too far apart.
     """
-    hinge, length = _hinge(antenna, springs, params), 1e3 * antenna.link_length
+    hinge, length = _hinge_sizes(antenna, springs, params), 1e3 * antenna.link_length
     wall, play = params.wall_mm, params.play_mm
     width, thickness, _ = STRIPS[antenna.sensor.kind]
     floor = hinge.lug + play
@@ -176,7 +176,9 @@ def layout_of(
     return layout
 
 
-def _hinge(antenna: AntennaSpec, springs: tuple[Spring, ...], params: PrintParams) -> HingeSizes:
+def _hinge_sizes(
+    antenna: AntennaSpec, springs: tuple[Spring, ...], params: PrintParams
+) -> HingeSizes:
     wall, play, stop = params.wall_mm, params.play_mm, antenna.range
     pin = math.floor(10.0 * ARBOR_SHARE * min(s.narrowest for s in springs)) / 10.0
     lug = pin / 2.0 + play + wall

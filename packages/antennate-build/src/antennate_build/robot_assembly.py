@@ -185,15 +185,33 @@ def at_head(robot: RobotSolids, antenna: AntennaSolids, turn: float = 0.0) -> li
     return parts
 
 
-def base_check(robot: RobotSolids, antenna: AntennaSolids) -> Check:
-    """Antennae and head at every angle of the base servos."""
+def base_check(robot: RobotSolids, antenna: AntennaSolids) -> tuple[Check, str]:
+    """Antennae and head at angles of the base servos, and what limits these; empty if nothing does.
+
+    Antennae that lie along the body may meet the leg servos before the limit of their bases.
+    """
     limit, head = robot.layout.robot.antennae.limit, robot.link(0)
-    meetings: list[Meeting] = []
-    for turn in np.linspace(-limit, limit, YAWS):
-        where = f"at {math.degrees(turn):.0f} deg"
-        meetings += checks.between(head, at_head(robot, antenna, float(turn)), where)
-    name = f"antennae and head, bases up to {math.degrees(limit):.0f} deg either way"
-    return checks.judged(name, meetings)
+    good: list[Meeting] = []
+    free, told = limit, ""
+    for share in np.linspace(0.0, 1.0, YAWS):
+        found = [
+            each
+            for turn in {-limit * share, limit * share}
+            for each in checks.between(
+                head, at_head(robot, antenna, float(turn)), f"at {math.degrees(turn):.0f} deg"
+            )
+        ]
+        worst = checks.worst(found)
+        if worst is not None and worst.volume > checks.LARGEST_OVERLAP and share > 0.0:
+            free = limit * (share - 1.0 / (YAWS - 1))
+            told = (
+                f"Bases: {' and '.join(worst.parts)} meet {worst.where}; the parts are free up to "
+                f"{math.degrees(free):.0f} deg, robot.antennae.limit is {math.degrees(limit):.0f}."
+            )
+            break
+        good += found
+    name = f"antennae and head, bases up to {math.degrees(free):.0f} deg either way"
+    return checks.judged(name, good), told
 
 
 def robot_checks(robot: RobotSolids, tick: Callable[[], object]) -> list[Check]:

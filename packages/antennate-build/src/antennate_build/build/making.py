@@ -53,6 +53,7 @@ class Product:
         steps: Steps of the assembly, under their titles.
         items: The bill.
         figures: Drawings by name.
+        apart: Where it is not what is simulated.
     """
 
     parts: dict[str, Solid] = field(default_factory=dict)
@@ -64,6 +65,7 @@ class Product:
     steps: dict[str, tuple[str, ...]] = field(default_factory=dict)
     items: list[billing.Item] = field(default_factory=list)
     figures: dict[str, Figure] = field(default_factory=dict)
+    apart: list[str] = field(default_factory=list)
 
 
 def made(
@@ -95,7 +97,7 @@ def made(
         springs=springs,
         checks=[Checked(name=c.name, found=c.found, good=c.good) for c in product.checks],
         masses=product.masses,
-        apart=apart(config),
+        apart=[*apart(config), *product.apart],
     )
     files["step/assembly.step"] = kernel.step(product.placed)
     files["assembly.md"] = "\n".join(
@@ -148,7 +150,9 @@ def _add_links(
     whole = robot.whole()
     if antenna is not None:
         whole += robot_assembly.at_head(robot, antenna)
-        product.checks.append(robot_assembly.base_check(robot, antenna))
+        check, told = robot_assembly.base_check(robot, antenna)
+        product.checks.append(check)
+        product.apart += [told] if told else []
     for name, solid in robot.printed.items():
         product.parts[name] = solid
         product.counts[name] = robot.counts[name]
