@@ -102,13 +102,15 @@ def test_help_fits_two_screens_and_help_all_shows_every_flag(capsys, command):
     assert max(map(len, whole.splitlines())) <= 80
     flags = set(re.findall(r"^  (--[a-z0-9-]+)(?!\S)", "\n".join(short), re.MULTILINE))
     assert ("--config" in flags) == (
-        command not in ("report", "study merge", "study", "antenna", "log view", "parameters")
+        command
+        not in ("report", "study merge", "study", "antenna", "build", "log view", "parameters")
     ), "these have no parameters, or take the file without a flag"
     assert flags <= set(re.findall(r"^  (--[a-z0-9-]+)(?!\S)", whole, re.MULTILINE))
 
 
 @pytest.mark.parametrize(
-    ("command", "words"), [("antenna", "[FILE]"), ("robot", "[NAME|FILE]"), ("study", "FILE")]
+    ("command", "words"),
+    [("antenna", "[FILE]"), ("build", "[FILE]"), ("robot", "[NAME|FILE]"), ("study", "FILE")],
 )
 def test_the_usage_has_what_may_be_left_out_in_brackets(capsys, command, words):
     assert main([command, "--help"]) == 0

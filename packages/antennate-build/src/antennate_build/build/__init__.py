@@ -1,4 +1,4 @@
-"""Parts of a robot or an antenna: STEP, STL, springs, drawings, what to buy.
+"""Parts of a robot or antenna: STEP, STL, springs, drawings, a bill.
 
 FILE is a robot, by its name or TOML file, or an antenna alone (the keys of [antenna]). Printed
 parts and springs of stock wire follow from the numbers with which it is simulated. The folder
