@@ -65,7 +65,7 @@ def test_version_and_help(capsys):
         "drive",
     ]
     listed = [line.split()[0] for lines in sections for line in lines[1:] if line[2] != " "]
-    assert len(listed) == 23
+    assert len(listed) == 24
     assert set(listed) >= {name.split()[0] for name in commands()}
 
 
