@@ -59,7 +59,7 @@ def test_loose_legs_make_a_spring_softer_by_a_third_of_their_length() -> None:
     assert spring.loose_stiffness == pytest.approx(spring.stiffness * 3 / (3 + added))
 
 
-def test_holes_of_servos_are_those_of_the_drawings() -> None:
+def test_holes_of_servos_are_those_of_the_solids_of_their_maker() -> None:
     """X330: four on a circle of 12 mm; X430: on one of 16 mm, in the case 24 x 12 and 22 x 40."""
     assert (X330.horn.circle, X330.horn.holes, X430.horn.circle) == (12.0, 4, 16.0)
     ys, zs = zip(*X430.sides, strict=True)

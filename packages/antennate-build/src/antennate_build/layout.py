@@ -21,8 +21,8 @@ from antennate_build.printing import PrintParams
 from antennate_build.winding import ARBOR_SHARE, LEG_ROOM, Spring
 
 STRIPS = {"flex": (6.35, 0.43, 112.2), "fsr": (10.2, 0.30, 120.0)}
-"""Width, thickness and whole length of the sensor [mm]: Spectra Symbol FS-L-0095-103 (datasheet);
-ZD10-100, a pressure strip (datasheet: 10 mm wide; the rest assumed)."""
+"""Width, thickness and whole length of the sensor [mm]: Spectra Symbol FS-L-0095-103 and
+ZD10-100, a pressure strip (assumed: not looked up; measure yours before you print)."""
 _FACE = 0.7
 """Shortest stop face, seen along the pin [mm] (assumed: nearly two lines)."""
 FOOT = 0.7

@@ -3,8 +3,9 @@
 The origin lies on the shaft, z along it towards the horn, y along the case away from its longer
 part. Lengths are in mm. The numbers are those of ROBOTIS' own solids: XL-430_new and XL,XC-330,
 as they stand in the assembly of the arm low_cost_robot (hardware/follower/step/arm.step), measured
-there; they agree with ROBOTIS' drawings of the XL/XC-330 (2020-05-28: four holes of 1.6 on a circle
-of 12) and of the horn HN12-N101 (2019-05-22: eight M2 on a circle of 16). The e-manual gives the
+there. Others cite the same circles from ROBOTIS' drawings of the XL/XC-330 (2020-05-28: four holes
+of 1.6 on a circle of 12) and of the horn HN12-N101 (2019-05-22: eight M2 on a circle of 16); the
+drawings themselves were not at hand. The e-manual gives the
 XC430 and the XL430 the same frames (FR12 series) and size (28.5 x 46.5 x 34).
 """
 
@@ -111,7 +112,7 @@ X330 = Mount(
     back=((8.0, 7.5), (-8.0, 7.5), (8.0, -22.5), (-8.0, -22.5)),
     depth=4.5,
     screw=M2_TAPPING,
-    source="ROBOTIS: solid XL,XC-330; drawing XL/XC-330 of 2020-05-28",
+    source="ROBOTIS: solid XL,XC-330, measured",
 )
 X430 = Mount(
     name="X430",
@@ -124,7 +125,7 @@ X430 = Mount(
     back=((11.0, 8.0), (-11.0, 8.0), (11.0, -32.0), (-11.0, -32.0)),
     depth=3.8,
     screw=M2_5_TAPPING,
-    source="ROBOTIS: solid XL-430_new; drawing HN12-N101 of 2019-05-22; frames FR12",
+    source="ROBOTIS: solid XL-430_new, measured; horn HN12-N101, as others cite it",
 )
 GRAMS = {"xc430_w240": 65.0, "xl430_w250": 57.2, "xl330_m288": 18.0}
 """Mass of a servo by its name [g]: ROBOTIS e-manual."""
