@@ -71,7 +71,9 @@ def _commands() -> list[type[Params]]:
 
 
 def _nested(config: type[Params], package: str) -> list[type[Params]]:
-    """A configuration and the groups in it that belong to the package of an experiment."""
+    """A configuration and its groups that belong to an experiment, or to its distribution."""
+    distribution = package.partition(".")[0]
+    package = package if distribution == "antennate" else distribution
     found = [config]
     for field in config.model_fields.values():
         default = field.get_default(call_default_factory=True)

@@ -46,9 +46,9 @@ class Fitted(Params):
 
     name: str = number("", "1", "assumed: has to be named")
     """Path of the number, as `servos.xc430_w240.gain_divisor`, and its place in a list."""
-    low: float = number(0.0, "1", "assumed: has to be given")
+    low: float = number(0.0, "1", "assumed: has to be given", ge=-1e6)
     """Lower end of the 90 % interval, in the unit of the number."""
-    high: float = number(0.0, "1", "assumed: has to be given")
+    high: float = number(0.0, "1", "assumed: has to be given", ge=-1e6)
     """Upper end."""
     source: str = number("", "1", "assumed: not known")
     """Logs that tell it."""
