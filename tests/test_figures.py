@@ -168,6 +168,8 @@ def test_letters_of_the_pictures_of_the_docs_are_read_on_a_phone():
     pictures = [*ROOT.glob("docs/images/*.png"), *ROOT.glob("docs/science/*.png")]
     assert len(pictures) > 25
     for path in pictures:
+        if path.name.startswith("build_"):
+            continue  # sheets of drawings, which are opened by themselves
         with Image.open(path) as image:
             inches = image.width / image.info["dpi"][0]
         height = phone.height(LETTERS.get(path.name, 7.0), inches)

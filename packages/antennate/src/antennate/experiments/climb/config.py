@@ -179,11 +179,12 @@ class ClimbConfig(Params):
     def _over_base(cls, robot: Any) -> Any:
         """What is not given is that of the robot that climbs; a whole robot lacks nothing.
 
-        One without an inertial sensor is written without `imu`, and is whole.
+        One without an inertial sensor is written without `imu`, one of which nothing was fitted
+        without `fitted`; both are whole.
         """
         if not isinstance(robot, Mapping):
             return robot
-        if RobotSpec.model_fields.keys() - robot.keys() - {"imu"}:
+        if RobotSpec.model_fields.keys() - robot.keys() - {"imu", "fitted"}:
             robot = put_over(RobotSpec.named(ROBOT).model_dump(), robot)
         return _with_tuples(robot)
 
