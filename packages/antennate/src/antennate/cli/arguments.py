@@ -176,10 +176,10 @@ def _filled(model: type[_Model], base: Mapping[str, Any], values: Values) -> _Mo
 
 
 def _is_whole(base: Any, path: tuple[str, ...], table: Mapping[str, Any]) -> bool:
-    """Whether nested tables hold, at a path, every plain value of a table but empty lists."""
+    """Whether nested tables hold, at a path, every plain value that a table has."""
     for part in path:
         base = base.get(part) if isinstance(base, dict) else None
-    plain = {k for k, value in table.items() if not isinstance(value, dict) and value != ()}
+    plain = {key for key, value in table.items() if not isinstance(value, dict)}
     return isinstance(base, dict) and plain <= base.keys()
 
 

@@ -302,10 +302,12 @@ def with_bases(table: Mapping[str, Any], model: type[BaseModel], folder: Path) -
 
 
 def stated(group: BaseModel) -> dict[str, Any]:
-    """Every value of a group that is named, and of the groups in it what its file states."""
+    """Every value that a group writes, and of the groups in it what its file states."""
+    written = group.model_dump()
     return {
         name: value.model_dump(exclude_unset=True) if isinstance(value, BaseModel) else value
         for name, value in group
+        if name in written
     }
 
 

@@ -177,14 +177,13 @@ class ClimbConfig(Params):
     @field_validator("robot", mode="before")
     @classmethod
     def _over_base(cls, robot: Any) -> Any:
-        """What is not given is that of the robot that climbs; a whole robot lacks nothing.
+        """What is not given is that of the robot that climbs.
 
-        One without an inertial sensor is written without `imu`, one of which nothing was fitted
-        without `fitted`; both are whole.
+        A robot that has all that the default one writes is whole, and lacks nothing.
         """
         if not isinstance(robot, Mapping):
             return robot
-        if RobotSpec.model_fields.keys() - robot.keys() - {"imu", "fitted"}:
+        if RobotSpec().model_dump().keys() - robot.keys():
             robot = put_over(RobotSpec.named(ROBOT).model_dump(), robot)
         return _with_tuples(robot)
 
