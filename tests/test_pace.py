@@ -186,6 +186,7 @@ def test_a_pace_that_is_no_number_is_refused(pace: object) -> None:
 
 
 def test_an_environment_refuses_a_gait_that_is_too_fast() -> None:
+    pytest.importorskip("gymnasium")
     from antennate.envs.config import EnvConfig
 
     ours = {"interface": {"action": "gait", "frequency": (0.2, 1.0)}}

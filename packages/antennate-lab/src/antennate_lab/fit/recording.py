@@ -6,7 +6,6 @@ is taken between two ticks.
 
 from __future__ import annotations
 
-import hashlib
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -14,12 +13,12 @@ import numpy as np
 
 from antennate.errors import BadInputError
 from antennate.robots.spec import RobotSpec
-from antennate.telemetry.header import parts
 from antennate.telemetry.reader import LogReader
 from antennate.telemetry.steps import LoggedStep, protocol_of, steps
 from antennate.telemetry.ticks import Tick
 from antennate.types import Floats
 from antennate_lab.fit.simulated import Course
+from antennate_lab.servo.drive_log import log_hash
 
 DRIFT = 0.003
 """A clock that runs fast or slow by more of its time is named (assumed: a crystal has 0.0001)."""
@@ -97,7 +96,7 @@ def read(path: Path, robot: RobotSpec) -> Recording:
         )
     zero = _gyro_zero(courses)
     courses = [replace(course, gyro=course.gyro - zero) for course in courses]
-    return Recording(path.stem, _hash(path), courses, zero, left_out, warnings)
+    return Recording(path.stem, log_hash(path), courses, zero, left_out, warnings)
 
 
 def _gyro_zero(courses: list[Course]) -> Floats:
@@ -191,13 +190,3 @@ def _drift(steps_of: list[list[Tick]], period: float) -> list[str]:
             f"clock of the loop runs {100 * (tick / period - 1.0):+.1f} %, or the loop was late"
         )
     return told
-
-
-def _hash(path: Path) -> str:
-    """Hash of all files of a log."""
-    whole = hashlib.sha256()
-    for part in parts(path):
-        with part.open("rb") as file:
-            for piece in iter(lambda: file.read(1 << 20), b""):
-                whole.update(piece)
-    return whole.hexdigest()

@@ -70,7 +70,7 @@ def read(path: Path, config: ServoConfig) -> Recording:
     unknown = np.full(len(t), math.nan)
     return Recording(
         name=f"{path.name}: {config.joint}",
-        sha256=_hash(path),
+        sha256=log_hash(path),
         p_gain=robot.servos.of(config.servo).p_gain,
         mass=config.mass or 0.0,
         length=config.length or 0.0,
@@ -132,8 +132,8 @@ def _torque(path: Path, ticks: list[Tick], near: Bools) -> tuple[Bools, Bools]:
     return follows, follows | ~(on | lost)
 
 
-def _hash(path: Path) -> str:
-    """Hash of all files of a log."""
+def log_hash(path: Path) -> str:
+    """SHA-256 of all files of a log, as hexadecimal digits."""
     whole = hashlib.sha256()
     for part in parts(path):
         with part.open("rb") as file:
