@@ -241,22 +241,17 @@ def test_a_client_reads_joints_a_hundred_times_a_second(tmp_path: Path) -> None:
 
 @pytest.mark.ci
 def test_a_robot_walks_by_goals_and_holds_without_them(tmp_path: Path) -> None:
-    """Rubbish between them is counted. A machine that stands still ends the topics; then again."""
-    for number in range(3):
-        folder = tmp_path / str(number)
-        folder.mkdir()
-        words = ["--arm", "--accept", "--dry-run", "1", "--duration", "18", *NO_SERVO]
-        with (
-            driven(folder, *words) as (_, result),
-            peer("goals", "16", "0.1", *NAMES),
-            peer("rubbish", "16"),
-        ):
-            end = result()
-        with LogReader(folder / "run" / "drive.mcap") as log:
-            ticks = [one for one in log if one.sent]
-        walked = [one for one in ticks if one.maneuver == Maneuver.FORWARD]
-        if walked and ticks[-1].maneuver == Maneuver.HOLD:
-            break
+    """Rubbish between them is counted."""
+    words = ["--arm", "--accept", "--dry-run", "1", "--duration", "18", *NO_SERVO]
+    with (
+        driven(tmp_path, *words) as (_, result),
+        peer("goals", "16", "0.1", *NAMES),
+        peer("rubbish", "16"),
+    ):
+        end = result()
+    with LogReader(tmp_path / "run" / "drive.mcap") as log:
+        ticks = [one for one in log if one.sent]
+    walked = [one for one in ticks if one.maneuver == Maneuver.FORWARD]
     assert end["controller"] == "goals"
     assert end["goals"]["refused"] > 100
     assert end["torque_off"] is True
