@@ -19,6 +19,7 @@ import struct
 import time
 from collections import deque
 from collections.abc import Callable, Sequence
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -185,6 +186,8 @@ class TouchStimulus:
         self, orders: Sequence[str], antenna: AntennaSpec, right: AntennaSpec | None = None
     ) -> None:
         self._antennae = antenna, right or antenna
+        for each in self._antennae:  # a first one takes 50 ms, for which a board may not be silent
+            _press(each, each.length, flex=TOUCH_FLEX)
         self._timed = sorted(
             (_read_touch(text, self._antennae, timed=True) for text in orders),
             key=lambda order: order[3],
@@ -247,6 +250,7 @@ def _read_touch(
     return SIDES.index(match[1]), press, length, float(match[5] or 0.0)
 
 
+@lru_cache(maxsize=64)
 def _press(antenna: AntennaSpec, mark: float, flex: float | None = None, way: float = 0.0) -> Press:
     """The press at a place [m] that gives a flex [rad] or moves it aside [m], by the statics."""
     chain = Chain.of(antenna)
