@@ -17,7 +17,7 @@ import pytest
 from doctor_rig import Patient
 from lockstep import BoardPort, LockstepClock
 from log_ticks import HEADER
-from recorded import act, leaves, meet_ground, recorded
+from recorded import act, leaves, meet_ground, press, recorded
 from setup_rig import Box, Script
 from stated import stated
 from worlds import recorded as logged
@@ -37,6 +37,7 @@ from antennate.hardware.config import (
 )
 from antennate.hardware.driving.connect import prepare
 from antennate.hardware.driving.drive import drive as walk
+from antennate.hardware.driving.goals import GoalController
 from antennate.hardware.ports.finder import finder
 from antennate.hardware.safety.session import Session
 from antennate.hardware.setup.servos import ServoSetup, joints_of
@@ -137,6 +138,8 @@ def driven(
         for name in (name for name in BUILT_IN if name not in climbing):
             act(name, config.control, config.robot)
         meet_ground(config.control, RobotSpec.named("scuttle3d"))
+        control, robot = config.control, config.robot
+        press(GoalController(control, robot, config.goals, lambda: None, lambda: 0.0), control)
 
 
 def run_drive(patch: Patch, config: DriveConfig, tmp_path: Path) -> None:

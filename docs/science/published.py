@@ -26,6 +26,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 import numpy as np
+import tomlkit
 import tuning
 from numpy.typing import NDArray
 from published_figures import marginals, screening, trade
@@ -886,10 +887,7 @@ def study_of(name: str, settings: Sequence[Mapping[str, Any]], trials: int, seed
         'plan = "list"',
         *([f"trials = {trials}"] if "trials" in first else []),
         "",
-        "[settings]",
-        *(f"{key} = {json.dumps(value)}" for key, value in first.get("settings", {}).items()),
-        f"seed = {seed}",
-        "",
+        tomlkit.dumps({"settings": {"seed": seed, **first.get("settings", {})}}),
         "[vary]",
         *(f'"{key}" = {json.dumps([s[key] for s in settings])}' for key in settings[0]),
     ]

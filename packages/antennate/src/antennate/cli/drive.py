@@ -93,12 +93,6 @@ class DriveOptions(ResultOptions, PortOptions, PageOptions):
     accept: bool = option(
         False, "walk by goals of joints from ROS 2, in place of a controller", needs=["--ros"]
     )
-
-
-@dataclass(frozen=True)
-class ProtocolOptions(DriveOptions):
-    """Whether to move, and who does what a protocol asks for."""
-
     tell: Path | None = option(
         None,
         "file or pipe for what a person is to do, such as the --orders of a twin; time confirms it",
@@ -109,7 +103,7 @@ class ProtocolOptions(DriveOptions):
 def command(argv: Sequence[str]) -> int:
     """Drive until the duration is over or it is stopped."""
     model = GoalsConfig if "--accept" in argv else DriveConfig
-    config, options = parse_robot("drive", DESCRIPTION, model, argv, ProtocolOptions)
+    config, options = parse_robot("drive", DESCRIPTION, model, argv, DriveOptions)
     require_antennae(config.robot, "drive")
     if not config.protocol:
         if options.tell is not None:
@@ -343,7 +337,7 @@ class TeleopOptions(DriveOptions):
 def teleop(argv: Sequence[str]) -> int:
     """Walk by keys until q, the duration is over or it is stopped."""
     config, options = parse_robot(
-        "teleop", TELEOP_DESCRIPTION, TeleopConfig, argv, TeleopOptions, without=("accept",)
+        "teleop", TELEOP_DESCRIPTION, TeleopConfig, argv, TeleopOptions, without=("accept", "tell")
     )
     if config.hold_to_run:
         raise ConfigError(

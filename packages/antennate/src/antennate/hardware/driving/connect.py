@@ -9,7 +9,7 @@ from statistics import median
 from typing import Any
 
 from antennate.control.knowledge import require_own_senses
-from antennate.control.registry import make_controller
+from antennate.control.registry import PROTOCOL, make_controller
 from antennate.errors import BadInputError
 from antennate.hardware.config import DriveConfig
 from antennate.hardware.doctor.check import latency_row
@@ -106,7 +106,7 @@ def connect(
 
 def _controller(config: DriveConfig) -> Controller:
     """The controller that is named; by keys it does not walk, but the gait does."""
-    if config.protocol:  # each step has its own frequency
+    if config.reader == PROTOCOL:  # each step has its own frequency
         return make_controller(config.controller, config.control, config.robot, walks=False)
     if not (walks := config.reader == config.controller):
         config.robot.require_pace("control.gait.frequency", config.control.gait.frequency)
