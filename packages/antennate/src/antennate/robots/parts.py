@@ -81,9 +81,14 @@ class Supply:
         return 0.8 * capacity / self.walking
 
 
+def _models(robot: RobotSpec) -> list[ServoParams]:
+    """Servo model of each joint; its gain is set later."""
+    return [robot.servos.of(name) for name in robot.servo_names]
+
+
 def supply(robot: RobotSpec) -> Supply:
     """The supply of a robot, from its description."""
-    servos = robot.joint_servos
+    servos = _models(robot)
     rails = tuple(
         _rail(
             voltage,
@@ -157,7 +162,7 @@ def bought(robot: RobotSpec) -> list[Part]:
 def _servos(robot: RobotSpec) -> list[Part]:
     counts: Counter[tuple[ServoModel, str]] = Counter()
     names = [name for name, _, count in robot.groups for _ in range(count)]
-    for servo, name in zip(robot.joint_servos, names, strict=True):
+    for servo, name in zip(_models(robot), names, strict=True):
         counts[servo.servo, name] += 1
     cables = len(robot.ids) + 1
     return [
