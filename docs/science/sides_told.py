@@ -579,6 +579,50 @@ def draw() -> None:
     HERE.joinpath("sides.png").write_bytes(render(drawing)["png"])
 
 
+def verdict() -> str:
+    """What the fresh draws say of the ten best, by items 2 and 4 of the criterion."""
+    screening, best = (
+        json.loads((HERE / f"sides_{plan}.json").read_text())["designs"]
+        for plan in ("screening", "best")
+    )
+    lines = [
+        "| design | largest AUC of the screening | on fresh draws | 95 % | 99.5 % | "
+        "without antennae | |",
+        "| --- | --- | --- | --- | --- | --- | --- |",
+    ]
+    bound, where = 0.0, ""
+    for name, fresh in best.items():
+        places = [(moment, label) for moment in WINDOWS for label in ("antennae", "all")]
+        found = [
+            (estimator["auc"], *place, how)
+            for place in places
+            for how, estimator in screening[name][place[0]][place[1]].items()
+        ]
+        auc, moment, label, how = max(found)
+        own = fresh[moment][label][how]
+        ends = own["interval_95"], own["interval_99_5"]
+        tells = own["auc"] >= 0.8 and ends[0][0] > 0.75
+        may = "tells" if tells else "may tell" if ends[1][1] >= 0.8 else "does not tell"
+        cells = [f"{auc:.2f}: {moment}, {label}, {how}", f"{own['auc']:.2f}"]
+        cells += [f"{low:.2f} to {high:.2f}" for low, high in ends]
+        cells += [f"{fresh[moment]['without antennae'][how]['auc']:.2f}", may]
+        lines.append(f"| {name} | {' | '.join(cells)} |")
+        for place in places:
+            for each, estimator in fresh[place[0]][place[1]].items():
+                if (most := estimator["interval_99_5"][1]) > bound:
+                    bound = most
+                    where = f"{name}: {', '.join(place)}, {each}, {estimator['auc']:.2f}"
+    return "\n".join([*lines, "", f"The largest upper end of all is {bound:.2f} ({where})."])
+
+
+def write_verdict() -> None:
+    """Write it into the page."""
+    page = HERE / "sides.md"
+    before, mark, rest = page.read_text().partition("<!-- best: sides_told.py -->\n")
+    _, end, after = rest.partition("\n<!-- end of best -->")
+    page.write_text(f"{before}{mark}{verdict()}{end}{after}")
+
+
 def main(argv: list[str]) -> None:
     """Judge a folder."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -610,6 +654,8 @@ def main(argv: list[str]) -> None:
         text = json.dumps(result, separators=(",", ":")) + "\n"
         HERE.joinpath(f"sides_{asked.plan}.json").write_text(text)
         draw()
+    if asked.plan == "best":
+        write_verdict()
     for name, design in result["designs"].items():
         cells = [
             f"{moment} {label} {mean_area(design[moment][label]):.2f}"
