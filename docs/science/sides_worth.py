@@ -16,7 +16,7 @@ import sys
 import time
 from collections.abc import Iterable
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -33,7 +33,7 @@ from antennate.figures import INK, SERIES, WIDTH, canvas, render, styled
 from antennate.params.control import ControlParams
 from antennate.params.gaits import GaitParams
 from antennate.sim.knowledge import SIDE_AHEAD
-from antennate.types import AntennaFrame, Floats, Ints, JointCommand, Maneuver
+from antennate.types import AntennaFrame, Floats, JointCommand, Maneuver
 
 HERE = Path(__file__).parent
 SEEDS = (591_001, 591_002, 591_003)
@@ -50,6 +50,8 @@ PLACE = 0.4
 """How far apart jams of one place are, at most [m]: a corridor's width."""
 SCENES = ("tunnel", "corner", "uturn", "room", "deadend")
 AUCS = (0.5, 0.6, 0.7, 0.8, 0.9, 1.0)
+NEEDED = (0.5, 0.7, 0.8)
+"""AUCs between which the bound x of the designs lies, and chance: these run first."""
 RESAMPLES = 10_000
 """Of the bootstrap over draws."""
 
@@ -76,12 +78,16 @@ class Rival:
 
 
 def rivals() -> dict[str, Rival]:
-    """All rivals, by name."""
-    found = {"geometric": Rival(), "geometric-side": Rival(side=True)}
-    found |= {"timed": Rival("timed"), "timed-side": Rival("timed", side=True)}
-    found |= {f"told-{auc:g}": Rival(auc=auc) for auc in AUCS}
-    found |= {f"kept-{auc:g}": Rival(auc=auc, kept=True) for auc in AUCS[:-1]}
-    return found | {f"first-{auc:g}": Rival(auc=auc, first=True, optional=True) for auc in AUCS[1:]}
+    """All rivals, by name. Those that the bound x does not need are optional."""
+    known = {"geometric-side": Rival(side=True), "timed": Rival("timed")}
+    known |= {"timed-side": Rival("timed", side=True)}
+    known |= {f"told-{auc:g}": Rival(auc=auc) for auc in AUCS}
+    known |= {f"kept-{auc:g}": Rival(auc=auc, kept=True) for auc in AUCS[:-1]}
+    known |= {f"first-{auc:g}": Rival(auc=auc, first=True) for auc in AUCS[1:]}
+    found = {"geometric": Rival()}
+    for name, rival in known.items():
+        found[name] = replace(rival, optional=rival.first or rival.auc not in NEEDED)
+    return found
 
 
 RIVALS = rivals()
@@ -261,7 +267,8 @@ def trials(folder: Path, rounds: int, workers: int, smoke: bool, frequency: floa
 def times_of(folder: Path) -> tuple[dict[str, Floats], dict[str, dict[str, Any]]]:
     """Times of each rival [s], shape (scenes, draws), NaN if invalid, and how many were right.
 
-    A failure counts as the limit. Draws are those that all rivals of the folder have done.
+    A failure counts as the limit. Draws are those that all needed rivals have done; an optional
+    one that has done fewer has NaN for the rest.
     """
     rows: dict[str, dict[tuple[str, int, int], Any]] = {}
     for path in sorted(folder.glob("*.json")):
@@ -274,11 +281,14 @@ def times_of(folder: Path) -> tuple[dict[str, Floats], dict[str, dict[str, Any]]
     )
     times, told = {}, {}
     for name in RIVALS:
-        if not all((s, *d) in rows.get(name, {}) for s in SCENES for d in draws):
+        own = rows.get(name, {})
+        whole = [draw for draw in draws if all((s, *draw) in own for s in SCENES)]
+        if not whole:
             continue
-        cells = [[rows[name][s, *draw] for draw in draws] for s in SCENES]
-        times[name] = np.array([[time_of(row) for row in line] for line in cells])
-        told[name] = shares([row["decisions"] for line in cells for row in line])
+        times[name] = np.array(
+            [[time_of(own[s, *d]) if d in whole else math.nan for d in draws] for s in SCENES]
+        )
+        told[name] = shares([own[s, *draw]["decisions"] for s in SCENES for draw in whole])
     return times, told
 
 
@@ -300,15 +310,17 @@ def shares(trials: list[Any]) -> dict[str, Any]:
     }
 
 
-def saved(base: Floats, other: Floats, chance: Ints) -> dict[str, Any]:
+def saved(base: Floats, other: Floats) -> dict[str, Any]:
     """Time that another rival saves [s], in each scene and in all alike, with 95 % intervals.
 
     Args:
         base: Times of the one that it is compared with, shape (scenes, draws).
-        other: Its times.
-        chance: Draws of each resample, shape (resamples, draws).
+        other: Its times. Compared are the draws that both have done.
     """
     gain = base - other
+    gain = gain[:, np.isfinite(gain).any(axis=0)]
+    count = gain.shape[1]
+    chance = np.random.default_rng(59).integers(count, size=(RESAMPLES, count))
     resampled = np.nanmean(gain[:, chance], axis=2)
     ends = np.percentile(resampled, [2.5, 97.5], axis=1).T
     pooled = np.percentile(resampled.mean(axis=0), [2.5, 97.5])
@@ -335,7 +347,6 @@ def table(folder: Path) -> None:
     count = next(iter(times.values())).shape[1]
     if not count:
         sys.exit("expected a draw that all rivals have done, found none")
-    chance = np.random.default_rng(59).integers(count, size=(RESAMPLES, count))
     result = {
         "seeds": SEEDS,
         "draws": count,
@@ -347,10 +358,11 @@ def table(folder: Path) -> None:
             name: {
                 "valid": np.isfinite(found).sum(axis=1).tolist(),
                 "crossed": (found < LIMIT).sum(axis=1).tolist(),
+                "draws": int(np.isfinite(found).any(axis=0).sum()),
                 "mean_s": np.nanmean(found, axis=1).tolist(),
                 **told[name],
-                "saved": saved(times["geometric"], found, chance),
-                "saved_chance": saved(times[chance_of(name, times)], found, chance),
+                "saved": saved(times["geometric"], found),
+                "saved_chance": saved(times[chance_of(name, times)], found),
             }
             for name, found in times.items()
         },
@@ -383,12 +395,12 @@ def span(value: float, ends: list[float]) -> str:
 
 def write(result: dict[str, Any]) -> None:
     """Write the table of the page."""
-    heads = ("side told", "right", *(f"`{scene}`" for scene in SCENES), "crossed")
+    heads = ("side told", "draws", "right", *(f"`{scene}`" for scene in SCENES), "crossed")
     heads = (*heads, "mean [s]", "saved against `geometric` [s]", "saved against its AUC 0.5 [s]")
     lines = [
-        f"{result['draws']} draws of each scene, seeds {', '.join(map(str, result['seeds']))}, at "
-        f"{result['frequency_hz']:g} Hz, at most {LIMIT:g} s. Each scene: mean time [s] "
-        "and how many crossed.",
+        f"{result['draws']} draws of each scene or fewer, seeds "
+        f"{', '.join(map(str, result['seeds']))}, at {result['frequency_hz']:g} Hz, at most "
+        f"{LIMIT:g} s. Each scene: mean time [s] and how many crossed.",
         "",
         f"| {' | '.join(heads)} |",
         "|" + " --- |" * len(heads),
@@ -399,7 +411,9 @@ def write(result: dict[str, Any]) -> None:
         whole = f"{sum(cell['crossed'])} of {sum(cell['valid'])}", f"{np.mean(cell['mean_s']):.1f}"
         gains = [span(cell[k]["all"], cell[k]["all_95"]) for k in ("saved", "saved_chance")]
         gains = ["" if gain.startswith("+0.0 (+0.0") else gain for gain in gains]
-        lines.append(f"| {' | '.join([label(name), share, *scenes, *whole, *gains])} |")
+        lines.append(
+            f"| {' | '.join([label(name), str(cell['draws']), share, *scenes, *whole, *gains])} |"
+        )
     lines += ["", "![Time saved by a teller, by its AUC](sides_worth.png)"]
     page = HERE / "sides.md"
     begin, rest = page.read_text().split("<!-- worth: ")
