@@ -51,8 +51,7 @@ pace](science/pace.md)), and a faster gait is refused.
 uv run --no-sync python examples/train_ppo.py --out other_policy
 ```
 
-Either is one file on PyTorch, to be read and changed. `uv sync` removes what it did not install,
-such as PyTorch; `uv sync --inexact` does not.
+`uv sync` removes what it did not install, such as PyTorch; `uv sync --inexact` does not.
 
 ## Use one
 
@@ -73,12 +72,12 @@ many = gym.make_vec("antennate/Tunnel-v1", num_envs=24)  # in lockstep, in one p
 `gym.make("antennate:Tunnel-v1")` imports the package by itself. After `SCENES.add("mine", ...)`,
 `antennate.envs.register()` adds an environment for your [own scene](scenes.md).
 
-`scuttle`, the robot if none is named, climbs no step of 8 cm. For ground with edges take
+`scuttle`, the default, climbs no step of 8 cm. For ground with edges take
 `gym.make("antennate/StepUp-v1", robot=RobotSpec.named("scuttle3d"), action="joints")`, with `from
 antennate.robots.spec import RobotSpec`. The action then has its pitch joints and the elevation of
 its antennae. Its inertial sensor is not observed.
 
-{ids}
+The ids, with their scenes: {ids}.
 
 - **An episode** follows from its seed and number alone, never from what ran before. It is the trial
   of `antennate tunnel` with that seed and number, bit for bit. `reset(seed=s)` begins episode 0,
@@ -92,13 +91,13 @@ its antennae. Its inertial sensor is not observed.
   tick of the next, in which the robot does not move.
 - **Autoreset** of a vector: `autoreset_mode="NEXT_STEP"` (the default), `"SAME_STEP"` (with
   `final_obs` and `final_info`) or `"DISABLED"` (with `reset(options={{"reset_mask": rows}})`).
-- **`info`** holds what only the simulation knows: `head` (x, y [m], heading [rad]), `progress` and
-  `length` [m], `force` [N], `t` [s], `maneuver`, `seed`, `episode_number`, the terms of the reward,
-  and at the end `outcome` and `reason`. None of it is in an observation.
+- **`info`** holds what only the simulation knows, and no observation: `head` (x, y [m], heading
+  [rad]), `progress` and `length` [m], `force` [N], `t` [s], `maneuver`, `seed`, `episode_number`,
+  the terms of the reward, and at the end `outcome` and `reason`.
 
 Stable-Baselines3 takes the single environment, `PPO("MlpPolicy", env)`; skrl takes the vector,
 `wrap_env(many)`, with `headless` set in its trainer. rsl_rl and LeRobot have interfaces of their
-own: `examples/rsl_rl_env.py`, `examples/lerobot_env.py`. `tests/test_training.py` tries all four.
+own: `examples/rsl_rl_env.py`, `examples/lerobot_env.py`.
 
 ## Observation
 
@@ -108,9 +107,9 @@ own: `examples/rsl_rl_env.py`, `examples/lerobot_env.py`. `tests/test_training.p
 `history` samples, one a decision, newest first, and a mean with the time constant `memory_time`;
 then sine and cosine of the gait phase; with joint targets the goal of each joint, too; and with
 `servos` how far each joint is from its goal, now and on average. A number is divided by its scale
-and clipped to its range. What came before the start counts as a free antenna and a robot that
-stood. A reading that cannot be used counts as that of a free antenna, and the robot holds. On a bus
-servos tell their angles a tick late.
+and clipped to its range. Before the start antennae count as free, and the robot as standing. A
+reading that cannot be used counts as that of a free antenna, and the robot holds. On a bus servos
+tell their angles a tick late.
 
 ## Action
 
@@ -153,8 +152,7 @@ each range, uniformly.
 
 {randomisation}
 
-What differs between the trials of a scene, such as its cylinders, the start and slipping legs, is
-drawn anyway (`variation`).
+What differs between trials of a scene, such as its cylinders, is drawn anyway (`variation`).
 
 ## Policy files
 
@@ -181,16 +179,13 @@ uv run antennate drive --arm \\
   and so may the calibration of the antennae: `flex` and `level` are made of any sensor by its own
   calibration, but one that is given `counts` is right for its own sensor alone. A parameter of the
   robot that is newer than the file had its default.
-- `write_policy` refuses arrays of other lengths than the contract says, NaN, numbers that float32
-  does not hold, and a `scale` or `clip` that is not above 0. `add_contract` refuses constants that
-  are NaN, infinite (but for masks and bounds) or 0 where they divide. Whoever loads a file first
-  asks for its answers to zeros and to a random observation: they, and its states, must be finite.
-- An answer that is not a number later on is HOLD. `tunnel`, `compete` and `drive` say in how many
-  decisions that was so.
+- `write_policy` and `add_contract` refuse numbers that cannot work, such as NaN, and arrays of
+  other lengths than the contract says. A file is first asked for its answers to zeros and to a
+  random observation: they, and its states, must be finite. An answer that is not a number later on
+  is HOLD; `tunnel`, `compete` and `drive` count these.
 
 `add_contract` puts a contract into the file of another exporter. This trains with Stable-Baselines3
-for a moment, and writes such a policy, which answers with the scores of the maneuvers, or the means
-of continuous actions (`uv pip install stable-baselines3 onnxscript`):
+for a moment, and writes such a policy (`uv pip install stable-baselines3 onnxscript`):
 
 ```python
 import gymnasium as gym
@@ -241,25 +236,25 @@ write_policy("chance.onnx", contract, [layer], np.zeros(inputs), np.ones(inputs)
 **From nothing: not known.** The longest run of PPO (`examples/train_ppo.py --scene corner uturn
 room --workers 7 --minutes 8.8 --seed 1`, and the same with `--readings none`) made 50,000 decisions
 of each network, with a reward that had no `early`. Of their last hundred episodes of training 36
-got out with touch and 47 without. One training seed, and no test: it says nothing of touch.
+got out with touch and 47 without. It says nothing of touch: one training seed, and no test.
 
 **By imitation it lives by touch.** Of 100 U-turns the student of `examples/imitate.py` crosses 76;
 its twin, taught alike without readings, crosses 11. It beats `timed`, which crosses 72 and takes
 17.5 s longer. It is not shown to beat `timed` at its own 1 Hz, which crosses 69 and takes 7.4 s
 longer. `geometric` crosses 82 and is as fast. Students of four more training seeds cross 70 to 83.
 
-The student walks at 1 Hz, on a robot with faster legs than ours (`robot.legs.fastest` 6.29 rad/s).
-It has its antennae, what it did itself in the last two seconds, and a memory, a gated recurrent
-unit of 128. It learns on its own episodes (DAgger; [Ross, Gordon and Bagnell
-2011](https://arxiv.org/abs/1011.0686)) what the search of `geometric` would do at 1 Hz, also after
-slips. Five times a second it chooses forward, left, right or backwards.
+The student walks at 1 Hz, so `robot.legs.fastest` is 6.29 rad/s. It has its antennae, what it did
+itself in the last two seconds, and a memory, a gated recurrent unit of 128. It learns on its own
+episodes (DAgger; [Ross, Gordon and Bagnell 2011](https://arxiv.org/abs/1011.0686)) what the search
+of `geometric` would do at 1 Hz, also after slips. Five times a second it chooses forward, left,
+right or backwards.
 
 The criterion stood before the run: `uturn`, 100 draws of seed 67957488, which was drawn by chance
 after the student had been taught. A failure counts as 100 s. A policy beats a rival where its mean
 time is less, Wilcoxon's signed rank test on the pairs, both sides, has p below 5 % with Holm's
-correction for the five rivals, and it does not cross fewer. That test asks whether it is faster in
-more draws and by more; the [interval](science/statistics.md) is that of the mean difference, over
-draws, of these policies alone. McNemar's exact test is of the successes.
+correction for the five rivals, and it does not cross fewer. The [interval](science/statistics.md)
+is that of the mean difference, over draws, of these policies alone. McNemar's exact test is of the
+successes.
 
 | | crossed of 100 | time [s] | minus the rival's [s] | Wilcoxon, Holm | McNemar, Holm |
 |---|---|---|---|---|---|
@@ -286,15 +281,15 @@ uv run python docs/science/learned.py  # all tables, of the rows beside it
 ```
 
 - **What it lacks**: 22 of its 24 failures turn round and leave by the entrance. So do 17 of the 18
-  of its teacher, `geometric` at 1 Hz: the teacher needs to know its way back.
+  of its teacher, `geometric` at 1 Hz.
 - **Where it had not learned**, at the corner of 120° and in the dead end, it beats `closed` and
   `geometric` by the criterion, **but not the clock**: `timed` is 18.8 s faster at the corner,
-  surely so; in the dead end neither is shown to be better. These two of the eight scenes of the
-  [board](leaderboard.md) were chosen as it was ahead there. So each was run on 100 fresh draws of a
-  hidden seed, 1530184314, with Holm's correction for the four tests, by a criterion that stood
-  before; `timed` ran once the others were known. At the corner the gait alone explains the lead:
-  its teacher at 1 Hz is no slower. In the dead end it is faster than its teacher, too. That it
-  crosses more is shown against `geometric` in the dead end alone.
+  surely so; in the dead end neither is shown to be better. These two scenes were chosen as it was
+  ahead there on the [board](leaderboard.md), so each was run on 100 fresh draws of a hidden seed,
+  1530184314, with Holm's correction for the four tests, by a criterion that stood before; `timed`
+  ran later. At the corner the gait alone explains the lead: its teacher at 1 Hz is no slower. In
+  the dead end it is faster than its teacher, too. That it crosses more is shown against `geometric`
+  in the dead end alone.
 
   | | of 100 | time [s] | rival | of 100 | time [s] | apart [s] | Wilcoxon | no zeros | McNemar |
   |---|---|---|---|---|---|---|---|---|---|
@@ -322,7 +317,7 @@ uv run python docs/science/learned.py  # all tables, of the rows beside it
   there leave by the entrance. The students of seeds 22 to 25 were not run in these scenes.
 - **Five training seeds** of the same program, on the same draws; the criterion stood before they
   ran. Four were taught after those draws were known, with nothing of the program changed. The entry
-  stays the first: to choose the best here would be to tune on these draws.
+  stays the first: to choose the best would be to tune on these draws.
 
   | | crossed of 100 | time [s] | minus that of `timed` [s] | Wilcoxon, Holm of 4 |
   |---|---|---|---|---|
@@ -342,26 +337,20 @@ uv run python docs/science/learned.py  # all tables, of the rows beside it
   | geometric at 1 Hz | +8.2 (-0.0 to +15.6) | 0.063 |
 
   Of the 117 failures of all five, 98 leave by the entrance.
-- **Former students** on other draws. One of 64 units, with half the decisions: 71 of 100 in 50.3 s,
-  its blind twin 13, `timed` 74, `geometric` 86 (seed 1063932532). Two without a memory: taught by
-  `closed` 75, by a teacher that knows the route 67, `timed` 69 (seed 20261377). A student cannot
-  feel what a teacher of the route knows.
 - **On [the twin](twin.md)** it crossed nine of ten tunnels, those of trials 0 to 9 of the same
-  seed, in 16 to 47 s; in the tenth it was still inside after 100 s. No drive ended with a fault, on
-  two cores that had little else to do, and all ten logs replay to the same commands, bit for bit
-  (`docs/science/on_the_twin.csv`; `python docs/science/on_the_twin.py FOLDER
-  entries/apprentice/policy.onnx --dry-run 1 --robot.legs.fastest 6.29`). The twin's servos are
-  programs: beside two other busy programs nine of ten drives of a former student ended with faults
-  of late answers.
+  seed, in 16 to 47 s; in the tenth it was still inside after 100 s. No drive ended with a fault,
+  and all ten logs replay to the same commands, bit for bit (`python docs/science/on_the_twin.py
+  FOLDER entries/apprentice/policy.onnx --dry-run 1 --robot.legs.fastest 6.29`). That needs free
+  cores, as the twin's servos are programs: beside two busy ones nine of ten drives of a former
+  student ended with faults of late answers.
 
 ## What is measured
 
-- 4,096 first observations of one environment are those of fresh processes that begin the same
-  episodes in the opposite order, bit for bit (`benchmarks/envs.py --resets 4096`).
-- Control ticks of a vector in a second of processor time, over those of as many trials of `tunnel`
-  in lockstep, starts left out: `benchmarks/envs.py` says {rates}.
-- The environments are versioned: where a scene, an observation or a reward changes, `v1` becomes
-  `v2`.
+- 4,096 first observations are those of fresh processes in the opposite order, bit for bit
+  (`benchmarks/envs.py --resets 4096`).
+- Speed of a vector over that of as many trials of `tunnel` in lockstep, starts left out: {rates}
+  (`benchmarks/envs.py`).
+- Where a scene, an observation or a reward changes, `v1` becomes `v2`.
 """
 RATES = (
     "1.04 for 8 robots and 1.01 for 24, over trials of `open`; with decisions of one tick 0.95 and "
@@ -419,7 +408,7 @@ def main() -> None:
         ((f"`{t.name}`", f"{t.weight:g}", t.unit, t.meaning) for t in TERMS),
     )
     page = PAGE.format(
-        ids=table(("id", "scene"), ((f"`{i}`", f"`{s}`") for i, s in envs.ids().items())),
+        ids=", ".join(f"`{i}` (`{s}`)" for i, s in envs.ids().items()),
         observation=quantities(channels(PolicyInterface(action="gait"), EnvConfig().robot)),
         ticks=interface.ticks,
         seconds=interface.ticks * control.period,
