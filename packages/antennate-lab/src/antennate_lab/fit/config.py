@@ -11,6 +11,7 @@ from pydantic import Field
 from antennate.errors import ConfigError, in_one_line
 from antennate.files import decoded, read_limited
 from antennate.params.base import LARGEST_FILE, Params, from_values, number, with_bases
+from antennate.robots.servos import ServoName
 from antennate.robots.spec import ROBOTS, RobotSpec
 
 
@@ -26,11 +27,13 @@ class FitConfig(Params):
             "positional": True,
         },
     )
-    """Logs of `drive --protocol`, of one robot."""
+    """Logs of `drive --protocol` of one robot, or recordings of one of its servos (JSON)."""
     robot: str = number(
         ROBOTS[0], "1", "assumed: the default robot", metavar="NAME|FILE", examples=list(ROBOTS)
     )
     """Robot that was driven: a name, or a TOML file of a robot, which may be a `robot.toml`."""
+    servo: ServoName | None = number(None, "1", "assumed: has to be named with recordings")
+    """Model of the servo that was recorded; logs name theirs."""
     leave_out: tuple[str, ...] = number(
         (), "1", "assumed: the walks at the middle one of the frequencies", metavar="STEP"
     )

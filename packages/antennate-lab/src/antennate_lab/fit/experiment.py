@@ -9,10 +9,11 @@ import numpy as np
 from antennate.studies.columns import Column, column_of, columns
 from antennate.studies.experiment import Experiment
 from antennate.studies.tables import Table
-from antennate_lab.fit import robot_file
+from antennate_lab.fit import robot_file, servo_recordings
 from antennate_lab.fit.config import FitConfig
 from antennate_lab.fit.result import FitResult, ParameterRow, StepRow
 from antennate_lab.fit.run import FitOutcome, run
+from antennate_lab.fit.servo_recordings import ServoFit
 
 _STEP_COLUMNS = ("error_before_deg", "error_deg", "lag_ms", "lag_after_ms", "turn_deg")
 ROBOT = "robot.toml"
@@ -47,7 +48,9 @@ def _untold(result: FitResult) -> Table:
 def _steps(result: FitResult) -> Table:
     """Steps that the fit did not see; all of them where it saw all."""
     held = [step for step in result.steps if not step.fitted] or result.steps
-    shown: list[Column] = [column_of(StepRow, name) for name in (*_STEP_COLUMNS, "turn_after_deg")]
+    names = (*_STEP_COLUMNS, "turn_after_deg")
+    held_by = [name for name in names if any(getattr(step, name) is not None for step in held)]
+    shown: list[Column] = [column_of(StepRow, name) for name in held_by]
     rows = [(f"{step.log} {step.step}", [each.cell(step) for each in shown]) for step in held]
     seen = "" if held is not result.steps else ", which the fit has seen"
     return Table(f"Steps as predicted{seen}", [each.title for each in shown], rows)
@@ -73,7 +76,11 @@ def sentence(result: FitResult) -> str:
 EXPERIMENT = Experiment.of_folder(
     __name__,
     FitConfig,
-    lambda config, workers, on_step, _: run(config, workers, on_step),
+    lambda config, workers, on_step, _: (
+        servo_recordings.run(config, on_step)
+        if servo_recordings.are_given(config)
+        else run(config, workers, on_step)
+    ),
     tables,
     sentence,
     result=FitResult,
@@ -82,13 +89,15 @@ EXPERIMENT = Experiment.of_folder(
     captions={
         "steps": "Left: each step's error of angles with the robot before (open) and the fitted "
         "one (filled); steps that the fit did not see are red. Right: a walk that it did not see.",
+        "servo": "Goals and measured positions of each recording of a servo, with those of two "
+        "models; shaded: full drive while the shaft rests.",
         "intervals": "Each number over its value before, with its 90 % interval; grey: not told.",
     },
     workers="here",
 )
 
 
-def _robot(outcome: FitOutcome) -> str:
+def _robot(outcome: FitOutcome | ServoFit) -> str:
     """Text of the fitted robot's file."""
     names = [each.name for each in outcome.recordings]
     return robot_file.written(outcome.config.text, outcome.found, names)

@@ -9,6 +9,8 @@ import numpy as np
 from antennate import figures as style
 from antennate_lab.fit.residuals import YAW_AXIS, moving
 from antennate_lab.fit.run import FitOutcome
+from antennate_lab.fit.servo_recordings import ServoFit
+from antennate_lab.servo import experiment as servo
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -18,8 +20,10 @@ _BEFORE, _AFTER, _UNSEEN = style.MUTED, style.SERIES[0], style.SERIES[4]
 
 
 @style.styled
-def figures(outcome: FitOutcome) -> dict[str, Figure]:
-    """Errors by step beside a walk, and the parameters with their intervals."""
+def figures(outcome: FitOutcome | ServoFit) -> dict[str, Figure]:
+    """Errors by step beside a walk, or recordings of a servo; parameters with their intervals."""
+    if isinstance(outcome, ServoFit):
+        return servo.figures(outcome.servo) | {"intervals": _intervals(outcome)}
     return {"steps": _steps(outcome), "intervals": _intervals(outcome)}
 
 
@@ -63,7 +67,7 @@ def _draw_walk(panel: Axes, outcome: FitOutcome) -> None:
     panel.legend(fontsize=7)
 
 
-def _intervals(outcome: FitOutcome) -> Figure:
+def _intervals(outcome: FitOutcome | ServoFit) -> Figure:
     rows = [row for row in outcome.rows if row.before > 0.0]
     figure = style.canvas(style.WIDTH, 1.0 + 0.18 * len(rows))
     panel = figure.subplots()

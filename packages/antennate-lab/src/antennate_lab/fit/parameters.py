@@ -46,6 +46,8 @@ class Scale:
 
 SCALES: Mapping[str, Scale] = {
     "gain_divisor": Scale("1", 8.0, 4000.0, 0.7, 0.02),
+    "stall_torque": Scale("N·m", 0.01, 20.0, 0.3, 0.02),
+    "no_load_speed": Scale("rad/s", 0.5, 200.0, 0.3, 0.02),
     "armature": Scale("kg·m²", 1e-5, 0.1, 0.7, 0.03),
     "friction": Scale("N·m", 0.0, 0.3, 0.05, 0.004, log=False),
     "load_friction": Scale("1", 0.0, 0.8, 0.2, 0.02, log=False),

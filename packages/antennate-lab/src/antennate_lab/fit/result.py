@@ -22,7 +22,7 @@ class ParameterRow:
     told: bool
     """Whether that is narrower than half of what was known before."""
     by: str = column("by")
-    """What tells it: `air` or `floor`; empty if nothing."""
+    """What tells it: `air`, `floor` or `bench`, a servo on its own; empty if nothing."""
     record: str
     """What to record so that it is told; empty if it is."""
 
@@ -32,26 +32,27 @@ class StepRow:
     """One step of a log, with the robot before the fit and with the fitted one."""
 
     log: str
-    """Name of the log."""
+    """Name of the log, or how many recordings of a servo."""
     step: str
-    """Name of the step."""
+    """Name of the step; of recordings the part that was left out, as of `servo`."""
     fitted: bool
     """Whether the fit saw it."""
     error_before_deg: float = column("error before", "deg", form=".2f")
-    """Root mean square error of the moving joints' angles, the robot before."""
+    """Root mean square error of the moving joints' angles, the robot before; mean error of a part
+    of recordings."""
     error_deg: float = column("after", "deg", form=".2f")
     """Likewise, the fitted robot."""
-    lag_ms: float = column("lag", "ms", form=".1f")
-    """Mean time by which moving joints follow late, measured."""
-    lag_before_ms: float = column("before", "ms", form=".1f")
+    lag_ms: float | None = column("lag", "ms", form=".1f", default=None)
+    """Mean time by which moving joints follow late, measured; `null` for recordings."""
+    lag_before_ms: float | None = column("before", "ms", form=".1f", default=None)
     """Likewise, the robot before."""
-    lag_after_ms: float = column("after", "ms", form=".1f")
+    lag_after_ms: float | None = column("after", "ms", form=".1f", default=None)
     """Likewise, the fitted robot."""
-    turn_deg: float | None = column("turn", "deg/cycle", form=".1f")
+    turn_deg: float | None = column("turn", "deg/cycle", form=".1f", default=None)
     """Turn of the head in a cycle of the gait, measured; `null` without."""
-    turn_before_deg: float | None = column("before", "deg/cycle", form=".1f")
+    turn_before_deg: float | None = column("before", "deg/cycle", form=".1f", default=None)
     """Likewise, the robot before."""
-    turn_after_deg: float | None = column("after", "deg/cycle", form=".1f")
+    turn_after_deg: float | None = column("after", "deg/cycle", form=".1f", default=None)
     """Likewise, the fitted robot."""
 
 

@@ -58,10 +58,10 @@ def _recordings(result: ServoResult) -> Table:
     measures = [each for each in columns(RecordingRow) if each.label]
     rows = [(row.name, [each.cell(row) for each in measures]) for row in result.recordings]
     title = f"Recordings: {result.models[-1].name}"
-    return Table(title, [each.title for each in measures], rows, " ".join(_stalls(result)))
+    return Table(title, [each.title for each in measures], rows, " ".join(stalls(result)))
 
 
-def _stalls(result: ServoResult) -> list[str]:
+def stalls(result: ServoResult) -> list[str]:
     """What is told of recordings in which a real servo stands still at full drive."""
     return [_stall(row) for row in result.recordings if (row.stalled or 0.0) >= SEEN]
 
@@ -100,7 +100,7 @@ def _note(result: ServoResult) -> str:
 
 def sentence(result: ServoResult) -> str:
     """How far the model is from the real servo, and which recording differs, and why."""
-    return " ".join(filter(None, [_misses(result), _spread(result), *_stalls(result)]))
+    return " ".join(filter(None, [_misses(result), _spread(result), *stalls(result)]))
 
 
 def _spread(result: ServoResult) -> str:

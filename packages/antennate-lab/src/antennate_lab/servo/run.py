@@ -82,15 +82,19 @@ class ServoOutcome:
         """Place of the model of a figure: as given, or with the data sheet's line."""
         return len(self.models) - (_JUDGED if self.config.fit else 1)
 
+    @property
+    def groups(self) -> int:
+        """How many parts are left out in turn for the intervals."""
+        return len(fitting.left_out(self.data.parts(), _by_file(self.recordings)))
+
     def result(self) -> ServoResult:
         """What the run comes to."""
-        by_file = _by_file(self.recordings)
-        count = len(fitting.left_out(self.data.parts(), by_file))
+        stretches = "" if _by_file(self.recordings) else "stretches of the "
         return ServoResult(
             servo=self.config.servo,
             fitted=self.config.fit,
             recordings=list(map(_summary, self.recordings, self.rows)),
-            interval_over=f"{count} {'' if by_file else 'stretches of the '}recordings",
+            interval_over=f"{self.groups} {stretches}recordings",
             models=[self._model(i, model) for i, model in enumerate(self.models)],
         )
 
@@ -205,7 +209,7 @@ def _supplied(recording: Recording, config: ServoConfig) -> Recording:
     if config.supply is None:
         raise BadInputError(
             f"{recording.name}: a fit needs the supply, as torque and speed follow it: expected it "
-            "in the recording or as --supply, found neither"
+            "in the recording or as --supply of `antennate servo`, found neither"
         )
     check_supply("--supply", np.array([config.supply]), config.given)
     return replace(recording, supply=np.where(unknown, config.supply, recording.supply))

@@ -1,0 +1,206 @@
+"""Recordings of one servo on a bench as numbers of a robot, by the estimator of `servo --fit`.
+
+Its whole model is taken if a known weight hung on the servo and the recordings tell all numbers,
+else the data sheet's line with both frictions: without a weight, and short of full drive, only
+ratios of torque, speed, gain and inertia show.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from antennate.errors import BadInputError
+from antennate.files import open_regular
+from antennate.jackknife import jackknife95
+from antennate.params.base import changes
+from antennate.robots.servos import MODEL_NUMBERS, ServosParams
+from antennate.studies.trials import OnStep, no_step
+from antennate.types import Floats
+from antennate_lab.fit.config import FitConfig
+from antennate_lab.fit.estimates import LEVEL, TOLD, Estimate
+from antennate_lab.fit.parameters import Parameter, parameters
+from antennate_lab.fit.result import FitResult, LogSummary, ParameterRow, StepRow
+from antennate_lab.servo import run as servo
+from antennate_lab.servo.experiment import stalls
+from antennate_lab.servo.recording import ServoConfig
+from antennate_lab.servo.result import ModelSummary, RecordingSummary
+
+_OF_LOGS = ("leave_out", "robots", "seed")
+"""Settings that recordings of a servo do not read."""
+_RECORD = "lift a known weight with this servo on a bench, at several gains"
+_ALIKE = 0.02
+"""Values of a number that differ by a smaller share are alike."""
+
+
+def are_given(config: FitConfig) -> bool:
+    """Whether the files are recordings of a servo, by their first character; False for logs.
+
+    Raises:
+        BadInputError: Some are, or one is a table of readings, or a setting is of the other kind.
+    """
+    tables = [name for name in config.log if Path(name).suffix.lower() == ".csv"]
+    if tables:
+        raise BadInputError(
+            f"{tables[0]}: expected logs of `drive --protocol` or recordings of a servo (JSON), "
+            "found a table: readings over bend set no number of a robot; `antennate calibrate "
+            "--recording FILE` fits their curve, and robot.toml names its file as `calibration`"
+        )
+    texts = [name for name in config.log if _is_json(Path(name))]
+    if texts and len(texts) < len(config.log):
+        raise BadInputError(
+            f"log: expected logs or recordings of a servo, found both, as {texts[0]}; fit one, "
+            "then the other with --robot FOLDER/robot.toml of the first"
+        )
+    if texts and (other := next(iter(changes(config, _OF_LOGS)), None)):
+        raise BadInputError(
+            f"{other[0]}: expected the default, as recordings of a servo do not read it, found "
+            "another"
+        )
+    if config.servo and not texts:
+        raise BadInputError(
+            f"servo: expected recordings of a servo (JSON), as logs name theirs, found "
+            f"{config.servo}"
+        )
+    return bool(texts)
+
+
+def _is_json(path: Path) -> bool:
+    try:
+        with open_regular(path) as file:
+            return file.read(64).lstrip(b"\xef\xbb\xbf \t\r\n")[:1] in (b"{", b"[")
+    except OSError:
+        return False
+
+
+@dataclass(frozen=True)
+class ServoFit:
+    """What a fit to recordings of a servo has found.
+
+    Attributes:
+        servo: What `servo` has found in them.
+        found: What is known of each number of the servo.
+        recordings: Each recording with the last model of `servo`.
+        steps: A row for each part that was left out in turn.
+        warnings: What is wrong.
+    """
+
+    config: FitConfig
+    servo: servo.ServoOutcome
+    found: list[Estimate]
+    recordings: list[RecordingSummary]
+    steps: list[StepRow]
+    warnings: list[str]
+
+    @property
+    def rows(self) -> list[ParameterRow]:
+        """A row for each number."""
+        rows = [each.row() for each in self.found]
+        return [row if row.told else replace(row, record=_RECORD) for row in rows]
+
+    def result(self) -> FitResult:
+        """What the run comes to."""
+        return FitResult(
+            logs=[
+                LogSummary(name=each.name, sha256=each.sha256, steps=[], left_out={}, warnings=[])
+                for each in self.recordings
+            ],
+            parameters=self.rows,
+            steps=self.steps,
+            correlations=[],
+            noise={},
+            warnings=self.warnings,
+            simulate="antennate tunnel --robot robot.toml",
+        )
+
+
+def run(config: FitConfig, on_step: OnStep = no_step) -> ServoFit:
+    """Fit a servo of a robot to recordings.
+
+    Raises:
+        BadInputError: They cannot be of that servo, or are too few for an interval.
+    """
+    robot = config.described
+    names = ", ".join(dict.fromkeys(robot.servo_names))
+    first, *others = config.log
+    if config.servo is None or config.servo not in robot.servo_names:
+        raise BadInputError(
+            f"servo: expected the model that was recorded, one of the robot's: {names}, found "
+            f"{config.servo or 'none'}"
+        )
+    if not others:
+        raise BadInputError(
+            f"{first}: expected two recordings or more, so that each can judge a fit to "
+            "the others, found one; `antennate servo --fit` takes it"
+        )
+    servos = ServosParams().model_copy(update={config.servo: robot.servos.of(config.servo)})
+    own = ServoConfig(recording=config.log, servo=config.servo, servos=servos, fit=True)
+    outcome = servo.run(own, on_step)
+    models = {each.name: each for each in outcome.result().models}
+    chosen = parameters(robot, [(f"servos.{config.servo}.{name}", None) for name in MODEL_NUMBERS])
+    model = models["whole model"]
+    found = _estimates(outcome, model, chosen)
+    if "stall_torque" not in model.free or not all(each.told for each in found):
+        model = models["data sheet + friction"]
+        found = _estimates(outcome, model, chosen)
+    given, count = models["as given"].held_out_deg, f"{len(config.log)} recordings"
+    steps = [
+        StepRow(log=count, step=part, fitted=False, error_before_deg=before, error_deg=after)
+        for part, after in model.held_out_deg.items()
+        if after is not None and (before := given[part]) is not None
+    ]
+    warnings = _beside(model, found) + [each.rstrip(".") for each in stalls(outcome.result())]
+    return ServoFit(config, outcome, found, outcome.result().recordings, steps, warnings)
+
+
+def _name(parameter: Parameter) -> str:
+    return parameter.path.rpartition(".")[2]
+
+
+def _estimates(
+    outcome: servo.ServoOutcome, model: ModelSummary, chosen: Sequence[Parameter]
+) -> list[Estimate]:
+    """Estimates of a model's numbers, by the half of their 90 % intervals on the search's scale."""
+    divisors = [d for each in outcome.recordings if (d := each.divisor()) is not None]
+    found = []
+    for each in chosen:
+        scale, value, groups = each.scale, getattr(model, _name(each)), outcome.groups
+        ends: Floats = np.array(model.interval_95.get(_name(each), (np.nan, np.nan)))
+        if each.path.endswith("gain_divisor") and "gain_divisor" not in model.free:
+            groups = len(divisors)
+            left = [float(np.mean(divisors[:i] + divisors[i + 1 :])) for i in range(groups)]
+            ends = value + jackknife95(0.0, np.array(left))
+        if scale.log:
+            value, ends = math.log(value), np.log(ends)
+        half = float(abs(ends - value).max()) * _narrower(groups)  # one end may be at a bound
+        known = LEVEL * scale.spread
+        told = half < TOLD * known
+        middle = value if told else each.searched(each.start)
+        low, high = middle + np.array([-1.0, 1.0]) * (half if told else known)
+        interval = (math.exp(low), math.exp(high)) if scale.log else (max(low, 0.0), float(high))
+        value = (math.exp(value) if scale.log else value) if told else each.start
+        found.append(Estimate(each, value, interval, told, "bench", np.zeros(1)))
+    return found
+
+
+def _narrower(groups: int) -> float:
+    """Width of a 90 % interval over that of 95 %, of a jackknife over groups."""
+    if groups < 2:
+        return math.nan
+    from scipy.special import stdtrit
+
+    return float(stdtrit(groups - 1, 0.95) / stdtrit(groups - 1, 0.975))
+
+
+def _beside(model: ModelSummary, found: Sequence[Estimate]) -> list[str]:
+    """Numbers that stay as they were although the others were fitted with another value."""
+    return [
+        f"{each.parameter.name} stays {each.value:.4g}, though the others were found with "
+        f"{getattr(model, _name(each.parameter)):.4g}"
+        for each in found
+        if not each.told and abs(getattr(model, _name(each.parameter)) / each.value - 1.0) > _ALIKE
+    ]
