@@ -18,7 +18,6 @@ from scipy import signal
 from antennate.control.protocol import Protocol, Step
 from antennate.errors import BadInputError, LogError
 from antennate.hardware.config import RobotConfig
-from antennate.robots.servos import MODEL_NUMBERS
 from antennate.robots.spec import RobotSpec
 from antennate.studies.pool import Workers
 from antennate.types import Floats
@@ -239,7 +238,10 @@ def test_every_scale_is_within_the_bounds_of_its_field() -> None:
     """What a search may reach is a robot: at both ends of each scale."""
     robot = RobotSpec(imu={"kind": "head"})  # type: ignore[arg-type]
     names = [
-        *((f"servos.xc430_w240.{name}", None) for name in (*MODEL_NUMBERS, "delay")),
+        *(
+            (f"servos.xc430_w240.{name}", None)
+            for name in ("gain_divisor", "armature", "friction", "load_friction", "delay")
+        ),
         ("legs.gain_factor", None),
         ("yaw.backlash", 1),
         ("antenna.three_coil_stiffness_n_mm_per_deg", None),
