@@ -11,6 +11,7 @@ import resource
 import shutil
 import subprocess
 import sys
+from collections.abc import Callable
 from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
@@ -517,3 +518,14 @@ def test_forces_and_coordinates_in_a_log_are_those_of_their_tick(tmp_path: Path)
             looks, pushed = looks + 1, pushed + (force > 0)
     assert pushed >= 10
     assert looks == pytest.approx((looks + len(seen)) / 10, abs=1)
+
+
+@pytest.mark.parametrize("word", ["missing", "drive.MCAP"])
+def test_first_word_that_is_nothing_is_asked_about_as_log_or_action(
+    word: str, refused: Callable[..., str]
+) -> None:
+    """A log has no flag, and neither has what is done with it."""
+    assert refused("log", word) == (
+        "antennate log: error: expected a log, the folder of a run, or one of info, recover, "
+        f"export, plot, film, found '{word}'\n"
+    )

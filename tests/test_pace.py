@@ -105,6 +105,27 @@ def test_a_gait_that_legs_keep_up_with_goes_on_to_the_ports(
     assert "/no/" in said(capsys, *words)
 
 
+@pytest.mark.parametrize("name", ["open", "closed"])
+def test_a_body_wave_that_goals_of_the_yaw_joints_cannot_keep_up_with_is_refused(
+    name: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A sine of 0.4 rad at 0.6 Hz moves 2 pi 0.6 * 0.4 = 1.508 rad/s at most."""
+    words = ["--controller", name, "--control.gait.amplitude", "0.4", "--robot.yaw.fastest"]
+    line = said(capsys, *words, "1.2")
+    assert "control.gait.frequency: expected at most 0.477 Hz, which robot.yaw.fastest" in line
+    assert line.endswith("of 1.2 rad/s allows, found 0.6")
+    assert "/no/" in said(capsys, *words, "1.51")
+
+
+@pytest.mark.parametrize("command", [DriveConfig, TeleopConfig])
+def test_a_session_with_slow_yaw_joints_is_not_prepared(command: type[DriveConfig]) -> None:
+    """By keys the gait walks, too."""
+    clock = LockstepClock(twin := watched(TwinConfig())[0])
+    config = command.model_validate({"robot": {"yaw": {"fastest": 0.5}}})
+    with pytest.raises(BadInputError, match=r"which robot\.yaw\.fastest of 0\.5 rad/s allows"):
+        prepare(config, BoardPort(twin, clock), clock, clock)
+
+
 def test_legs_that_do_not_roll_keep_up_with_any_gait() -> None:
     assert RobotSpec.named("hexapod").fastest_gait == float("inf")
 

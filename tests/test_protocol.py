@@ -97,7 +97,11 @@ def test_way_between_steps_is_short_and_slow() -> None:
         ({"place": "hanging", "joint": "yaw9"}, "expected a joint of the robot"),
         ({"place": "hanging", "joint": "yaw1", "amplitude": 1.0}, "amplitude of at most 0.50"),
         ({"place": "hanging", "joint": "yaw1", "highest": 11.0}, "highest of at most 10 Hz"),
-        ({"maneuver": "FORWARD", "frequency": 0.9}, "frequency of at most 0.837 Hz"),
+        ({"maneuver": "FORWARD", "frequency": 0.9}, "frequency: expected at most 0.837 Hz"),
+        (
+            {"maneuver": "TURN_L", "frequency": 0.9},
+            "step turn_l: frequency: expected at most 0.837",
+        ),
         ({"place": "hand", "antenna": "left", "mark": 130.0}, "mark of at most 120 mm"),
     ],
 )
@@ -135,7 +139,10 @@ def test_protocol_has_steps_of_different_names() -> None:
         ("", "steps: expected at least one, found none"),
         ("[[steps]]\nspeed = 3", "speed"),
         ('[[steps]]\nplace = "hanging"\njoint = "yaw9"', "yaw9: expected a joint of the robot"),
-        ('[[steps]]\nmaneuver = "FORWARD"\nfrequency = 0.9', "frequency of at most 0.837 Hz"),
+        (
+            '[[steps]]\nmaneuver = "FORWARD"\nfrequency = 0.9',
+            "frequency: expected at most 0.837 Hz",
+        ),
         ("[[steps]]\nseconds = -1", "seconds"),
         ("[[steps", "short.toml"),
     ],

@@ -22,7 +22,7 @@ from antennate.hardware.driving.drive import drive
 from antennate.params.safety import TouchCheckParams
 from antennate.robots.antenna import AntennaSpec
 from antennate.twin.board import TouchStimulus
-from antennate.twin.config import TwinConfig
+from antennate.twin.config import TwinConfig, watched
 from dynamixel_bus import packets
 
 ANTENNA = AntennaSpec()
@@ -50,6 +50,25 @@ def test_touches_begin_with_each_client_and_last_a_second() -> None:
         for t, left, right in ((1.9, 0, 0), (2.5, 1.0, 0), (3.1, 0, 0), (5.0, 0, np.pi / 3)):
             assert touch.change(begun + t, begun).tolist() == [reading(left), reading(right)]
         assert touch.change(begun + 6.5, begun).tolist() == [0, 0]
+
+
+def test_right_flex_sensor_feels_its_own_share_of_a_touch() -> None:
+    """A bend of 60 degrees is felt as one of 48 by a sensor of 0.8; the left one is as it was."""
+    touch = TouchStimulus(["left:60deg@0s", "right:60deg@0s"], ANTENNA, right_gain=0.8)
+    felt = [reading(np.pi / 3), reading(0.8 * np.pi / 3)]
+    assert touch.change(1.0, begun=0.0).tolist() == felt
+
+
+def test_twin_that_stands_knows_the_gain_of_its_right_flex_sensor() -> None:
+    """Its `--touch` and its orders alike."""
+    robot = {"antennae": {"right_gain": 0.8}}
+    config = TwinConfig.model_validate({"robot": robot, "touch": ["right:60deg@0s"]})
+    for touch in (
+        watched(config)[0].touch,
+        watched(TwinConfig.model_validate({"robot": robot}))[0].touch,
+    ):
+        touch.order("right:60deg")
+        assert touch.change(1.0, begun=0.0)[1] == reading(0.8 * np.pi / 3)
 
 
 def test_touches_can_be_ordered_and_the_next_client_finds_none_of_them() -> None:

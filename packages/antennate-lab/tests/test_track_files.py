@@ -273,6 +273,25 @@ def test_what_is_truncated_or_no_such_file_is_one_line(
     assert "expected a file in .csv, .h5" in refused("tracks", "--files", tmp_path / "a.mp4")
 
 
+def test_no_column_of_the_other_antenna_is_hinted_at(
+    tmp_path: Path, refused: Callable[..., str]
+) -> None:
+    """Where the left base is missing, R_base is not meant; what is spelt otherwise may be."""
+    names = [*BEE["left"], *BEE["right"], "tail", "head"]
+    flags = [*("--points.left", *BEE["left"]), *("--points.right", *BEE["right"])]
+    flags += ["--points.tail", "tail", "--points.head", "head"]
+    path = tmp_path / "a.csv"
+    for base, hint in (("stem", ""), ("L_bases", " (did you mean L_bases_x?)")):
+        header = [f"{base if name == 'L_base' else name}_{axis}" for name in names for axis in "xy"]
+        path.write_text(",".join(["frame", *header]) + "\n")
+        assert f"expected a column L_base_x{hint}, found" in refused(
+            "tracks", "--files", path, *flags
+        )
+    points = {base: np.zeros((3, 2)) for base in names if base != "L_base"}
+    deeplabcut(path, points)
+    assert "expected a point L_base, found" in refused("tracks", "--files", path, *flags)
+
+
 @pytest.mark.parametrize(
     ("text", "expected"),
     [

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
+import zipfile
 from pathlib import Path
 
 import pytest
 from test_control_tables import plain
 
+import dynamixel_bus
 from dynamixel_bus import packets
 from dynamixel_bus.command import main
 from dynamixel_bus.errors import ConfigError
@@ -134,3 +138,22 @@ def test_a_model_that_is_not_there_is_refused_with_the_nearest_name() -> None:
         servo_model("xl430-w25")
     with pytest.raises(ConfigError, match="expected a readable file"):
         servo_model("no-such-servo.toml")
+
+
+@pytest.mark.ci
+def test_models_are_read_from_a_zip(tmp_path: Path) -> None:
+    """Python imports packages from a zip, as a program of one file brings them."""
+    folder, place = Path(dynamixel_bus.__file__).parent, tmp_path / "program.zip"
+    with zipfile.ZipFile(place, "w") as file:
+        for part in (each for kind in ("py", "toml") for each in folder.rglob(f"*.{kind}")):
+            file.write(part, part.relative_to(folder.parent))
+    (tmp_path / "own.toml").write_text(XM430_W210)
+    code = "import sys; sys.path.insert(0, 'program.zip'); from dynamixel_bus import models as m; "
+    code += "print(m.__file__, m.XL330_M288.number, m.servo_model('own.toml').number)"
+    ran = subprocess.run(
+        [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False
+    )
+    assert ran.stderr == ""
+    where, *numbers = ran.stdout.split()
+    assert "program.zip" in where
+    assert numbers == ["1200", "1030"]

@@ -107,8 +107,9 @@ def require_points(path: Path, names: Sequence[str], known: Sequence[str]) -> No
     for name in names:
         if name not in known:
             listed = shortened(", ".join(dict.fromkeys(known)) or "none")
+            others = [each for each in known if each not in names]
             raise BadInputError(
-                f"{path}: expected a point {name}{nearest(name, known)}, found {listed}; name the "
+                f"{path}: expected a point {name}{nearest(name, others)}, found {listed}; name the "
                 "points of the antennae and the body axis with --points.*"
             )
 
@@ -282,8 +283,9 @@ def _plain(
     }
     for (_, coordinate), name in wanted.items():
         if name not in places:
+            others = [each for at, each in enumerate(header) if at not in places.values()]
             raise BadInputError(
-                f"{path}: row 1: expected a column {name}{nearest(name, header)}, found "
+                f"{path}: row 1: expected a column {name}{nearest(name, others)}, found "
                 f"{shortened(', '.join(header))}; name points with --points.* and columns with "
                 f"--columns.{coordinate}"
             )

@@ -23,7 +23,7 @@ from antennate.cli.terminal import BAD_INPUT, OK, progress, stop_signals
 from antennate.control.readings import condition
 from antennate.errors import FAILURES, ConfigError
 from antennate.files import remove_abandoned, require_room, write_whole, writing_whole
-from antennate.messages import command_words, one_line, typed
+from antennate.messages import command_words, one_line, shown, typed
 from antennate.params.base import Params, from_values
 from antennate.studies.formats import csv_lines
 from antennate.studies.parquet import require_parquet
@@ -57,6 +57,7 @@ _ENDINGS = {
     "plot": (".png", ".svg"),
     "film": (".mp4",),
 }
+_ACTIONS = ("info", *_ENDINGS)
 _ROWS = 4096
 """Ticks that are written to a Parquet file at once."""
 _SHOWN = 10
@@ -101,8 +102,7 @@ class LogOptions(ResultOptions):
 
 def command(argv: Sequence[str]) -> int:
     """Look at one log."""
-    if argv and (argv[0].endswith(".mcap") or Path(argv[0]).exists()):
-        argv = ["info", *argv]
+    argv = _with_action(argv)
     _, options = parse("log", DESCRIPTION, Params, argv, LogOptions)
     if not options.log:
         raise ConfigError("expected the name of a log or of a run, found none")
@@ -137,6 +137,20 @@ def command(argv: Sequence[str]) -> int:
         say_unguarded("log", log)
         return OK
     return complain("log", log)
+
+
+def _with_action(argv: Sequence[str]) -> Sequence[str]:
+    """The words of the command with `info` where a log stands first."""
+    word, *more = argv or ["-"]
+    if word in _ACTIONS or word.startswith("-"):
+        return argv
+    if word.endswith(".mcap") or "/" in word or Path(word).exists():
+        return ["info", *argv]
+    if more and not more[0].startswith("-"):
+        return argv
+    raise ConfigError(
+        f"expected a log, the folder of a run, or one of {', '.join(_ACTIONS)}, found {shown(word)}"
+    )
 
 
 def _target(path: Path, options: LogOptions) -> Path:

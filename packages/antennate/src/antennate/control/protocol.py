@@ -188,8 +188,8 @@ def _require_limits(step: Step, robot: RobotSpec, control: ControlParams) -> Non
         whole = 1e3 * robot.antenna.length
         bounds.append(("mark", step.mark or whole, whole, "mm", "the length of the antenna"))
     elif step.maneuver != "HOLD":
-        why = "which robot.legs.fastest allows"
-        bounds.append(("frequency", step.frequency, robot.fastest_gait, "Hz", why))
+        swing = control.gait.amplitude
+        robot.require_pace(f"step {step.called}: frequency", step.frequency, swing)
     for name, value, most, unit, why in bounds:
         if value > most:
             raise ConfigError(

@@ -348,20 +348,24 @@ class RobotSpec(Params):
         """Fastest gait at which goals of rolling legs keep up [Hz], inf for lifting legs."""
         return self.legs.fastest / (2.0 * math.pi) if self.legs.kind == "rolling" else math.inf
 
-    def require_pace(self, name: str, frequency: float) -> None:
-        """Refuse a gait that goals of the legs cannot keep up with.
+    def require_pace(self, name: str, frequency: float, amplitude: float = 0.0) -> None:
+        """Refuse a gait that goals of the legs or of the yaw joints cannot keep up with.
 
         Args:
             name: What has that frequency, for the message.
             frequency: Cycles a second [Hz].
+            amplitude: Amplitude of its body wave [rad]; 0 where goals of yaw joints have no limit.
 
         Raises:
-            ConfigError: It is faster than `fastest_gait`.
+            ConfigError: It is faster than `fastest_gait`, or the wave than `yaw.fastest`.
         """
-        if frequency > self.fastest_gait:
+        swing = 2.0 * math.pi * amplitude
+        waves = self.yaw.fastest / swing if swing else math.inf
+        most, group = min((self.fastest_gait, "legs"), (waves, "yaw"))
+        if frequency > most:
             raise ConfigError(
-                f"{name}: expected at most {math.floor(1e3 * self.fastest_gait) / 1e3:g} Hz, which "
-                f"robot.legs.fastest of {self.legs.fastest:g} rad/s allows, found {frequency:g}"
+                f"{name}: expected at most {math.floor(1e3 * most) / 1e3:g} Hz, which robot.{group}"
+                f".fastest of {getattr(self, group).fastest:g} rad/s allows, found {frequency:g}"
             )
 
     @property

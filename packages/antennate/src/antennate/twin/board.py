@@ -180,12 +180,17 @@ class TouchStimulus:
         orders: As above.
         antenna: The left antenna, for its springs and its flex sensor.
         right: The right one, as the left one if not given.
+        right_gain: Bend that the right flex sensor feels over what the left one does.
     """
 
     def __init__(
-        self, orders: Sequence[str], antenna: AntennaSpec, right: AntennaSpec | None = None
+        self,
+        orders: Sequence[str],
+        antenna: AntennaSpec,
+        right: AntennaSpec | None = None,
+        right_gain: float = 1.0,
     ) -> None:
-        self._antennae = antenna, right or antenna
+        self._antennae, self._gains = (antenna, right or antenna), np.array([1.0, right_gain])
         for each in self._antennae:  # a first one takes 50 ms, for which a board may not be silent
             _press(each, each.length, flex=TOUCH_FLEX)
         self._timed = sorted(
@@ -216,7 +221,7 @@ class TouchStimulus:
         for side, press in enumerate(ordered):
             flex[side] = flex[side] if press is None else press.flex
         sensor = self._antennae[0].sensor
-        return counts(sensor, flex) - counts(sensor, np.zeros(2))
+        return counts(sensor, self._gains * flex) - counts(sensor, np.zeros(2))
 
     def presses(self, t: float, begun: float) -> list[Press | None]:
         """What presses the left and the right antenna by an order; arguments as of `change`."""

@@ -137,7 +137,9 @@ def watched(config: TwinConfig, boot_id: int | None = None) -> tuple[TwinRobot, 
     body = SimRobot(1, config.robot, period, config.physics.timestep)
     body.load(0, start.world, start.chance)
     boot = config.trial + 1 if boot_id is None else boot_id
-    touch = TouchStimulus(config.touch, config.robot.antenna, config.robot.right_antenna)
+    own = config.robot
+    gain = own.antennae.right_gain
+    touch = TouchStimulus(config.touch, own.antenna, own.right_antenna, gain)
     passage = Passage(start.scene)
     robot = TwinRobot(
         body,

@@ -109,7 +109,8 @@ class TwinRobot:
         self.imu: ImuReadings | None = None
         if robot.has_imu:
             self.imu = ImuReadings(robot.imu, period, boot_id if standing_noise else None)
-        self.touch = touch or TouchStimulus((), robot.antenna, robot.right_antenna)
+        gain = robot.antennae.right_gain
+        self.touch = touch or TouchStimulus((), robot.antenna, robot.right_antenna, gain)
         self.hands = Hands(body.world(0))
         self.on_return: Callable[[], None] = lambda: None
         self.t = 0.0

@@ -6,6 +6,8 @@ A file may be `like` another model and then holds only what is different.
 from __future__ import annotations
 
 import functools
+import tomllib
+from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +18,7 @@ from dynamixel_bus.model import ServoModel
 from dynamixel_bus.model_file import checked, model_of
 
 _FOLDER = Path(__file__).parent
+_SHIPPED = sorted(file.name[:-5] for file in files(__name__).iterdir() if ".toml" in file.name)
 _LARGEST_FILE = 200_000
 """Most bytes of a model file."""
 
@@ -64,9 +67,9 @@ def _table_of(path: Path, above: tuple[Path, ...]) -> dict[str, Any]:
     if not all(isinstance(name, str) for name in (like, *names)):
         raise ConfigError(f"{path}: expected a name as `like`, and a list of names as `without`")
     base = path.parent / like if like.endswith(".toml") else _FOLDER / f"{like}.toml"
-    if not like.endswith(".toml") and not base.exists():
-        names = sorted(file.stem for file in _FOLDER.glob("*.toml"))
-        raise ConfigError(f"{path}: like: expected one of {', '.join(names)}, found {shown(like)}")
+    if not like.endswith(".toml") and like not in _SHIPPED:
+        known = ", ".join(_SHIPPED)
+        raise ConfigError(f"{path}: like: expected one of {known}, found {shown(like)}")
     found = _over(_table_of(base, (*above, place)), table)
     registers = dict(checked(found.get("registers"), f"{path}: registers", {}, others=True))
     for name in removed:
@@ -79,8 +82,8 @@ def _table_of(path: Path, above: tuple[Path, ...]) -> dict[str, Any]:
 
 @functools.cache
 def _shipped_table(path: Path) -> dict[str, Any]:
-    """What stands in one of our files, read once; nobody changes it."""
-    return read_toml(path, _LARGEST_FILE)
+    """What stands in one of our files, read once, from a zip too; nobody changes it."""
+    return tomllib.loads((files(__name__) / path.name).read_text(encoding="utf-8"))
 
 
 def _over(base: dict[str, Any], table: dict[str, Any]) -> dict[str, Any]:
@@ -92,7 +95,7 @@ def _over(base: dict[str, Any], table: dict[str, Any]) -> dict[str, Any]:
     }
 
 
-MODELS: dict[str, ServoModel] = {path.stem: _read(path) for path in sorted(_FOLDER.glob("*.toml"))}
+MODELS: dict[str, ServoModel] = {name: _read(_FOLDER / f"{name}.toml") for name in _SHIPPED}
 """The models that we ship, by the name of their file."""
 MODELS_BY_NUMBER = {model.number: model for model in MODELS.values()}
 XC430_W240, XL330_M288 = MODELS["xc430-w240"], MODELS["xl330-m288"]

@@ -8,8 +8,9 @@ from collections.abc import Callable, Iterator, Sequence
 from statistics import median
 from typing import Any
 
+from antennate.control.gait import Gait
 from antennate.control.knowledge import require_own_senses
-from antennate.control.registry import PROTOCOL, make_controller
+from antennate.control.registry import GOALS, PROTOCOL, make_controller
 from antennate.errors import BadInputError
 from antennate.hardware.config import DriveConfig
 from antennate.hardware.doctor.check import latency_row
@@ -108,9 +109,12 @@ def _controller(config: DriveConfig) -> Controller:
     """The controller that is named; by keys it does not walk, but the gait does."""
     if config.reader == PROTOCOL:  # each step has its own frequency
         return make_controller(config.controller, config.control, config.robot, walks=False)
-    if not (walks := config.reader == config.controller):
-        config.robot.require_pace("control.gait.frequency", config.control.gait.frequency)
-    return make_controller(config.controller, config.control, config.robot, walks=walks)
+    walks, gait = config.reader == config.controller, config.control.gait
+    made = make_controller(config.controller, config.control, config.robot, walks=walks)
+    if not walks or isinstance(getattr(made, "gait", None), Gait):
+        swing = 0.0 if config.reader == GOALS else gait.amplitude
+        config.robot.require_pace("control.gait.frequency", gait.frequency, swing)
+    return made
 
 
 def prepare(
