@@ -8,7 +8,8 @@ robots; B is 1 for a single one. "The paper" is arXiv 2603.07795.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import math
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, fields
 from enum import IntEnum
 from typing import Protocol
@@ -125,6 +126,16 @@ def joint_angles(command: JointCommand, parts: Iterable[str], batch: int = 1) ->
     The parts that a robot has, in the order of its joints, are those of `RobotSpec.command_shapes`.
     """
     return np.concatenate([getattr(command, name).reshape(batch, -1) for name in parts], axis=1)
+
+
+def joint_command(angles: Floats, shapes: Mapping[str, tuple[int, ...]]) -> JointCommand:
+    """The command of one robot with these angles side by side [rad], shape (n,).
+
+    `shapes` are those of its parts, of `RobotSpec.command_shapes`.
+    """
+    parts = np.split(angles, np.cumsum([math.prod(shape) for shape in shapes.values()])[:-1])
+    named = zip(shapes.items(), parts, strict=True)
+    return JointCommand(**{name: part.reshape(shape) for (name, shape), part in named})
 
 
 class Clock(Protocol):

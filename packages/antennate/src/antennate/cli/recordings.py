@@ -126,16 +126,12 @@ def recordings(config: DriveConfig, tell: Path | None) -> Iterator[Recordings]:
 @contextlib.contextmanager
 def _confirmations(by_time: bool) -> Iterator[Callable[[], bool] | None]:
     """Yield what says whether a key came since its last call; None where there are no keys."""
-    if by_time or sys.stdin is None or not sys.stdin.isatty() or not _in_front():
+    keys = not by_time and sys.stdin is not None and sys.stdin.isatty()
+    if not keys or os.tcgetpgrp(sys.stdin.fileno()) != os.getpgrp():  # not in the foreground
         yield None
         return
     with typed_keys() as read:
         yield lambda: any(key != END for key in read(0.0))
-
-
-def _in_front() -> bool:
-    """Whether this process runs in the foreground of its terminal."""
-    return os.tcgetpgrp(sys.stdin.fileno()) == os.getpgrp()
 
 
 @contextlib.contextmanager

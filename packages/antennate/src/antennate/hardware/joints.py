@@ -19,7 +19,7 @@ from antennate.errors import AntennateError
 from antennate.messages import typed
 from antennate.params.hardware import ZerosParams
 from antennate.robots.spec import RobotSpec
-from antennate.types import Floats, Ints, JointCommand
+from antennate.types import Floats, Ints, JointCommand, joint_command
 from dynamixel_bus.model import (
     MOST_TICKS,
     POSITION_UNIT,
@@ -208,10 +208,7 @@ class Joints:
 
     def command(self, ticks: Ints | Floats) -> JointCommand:
         """The command of one robot at these positions [ticks], shape (n,)."""
-        angles = self.angles(ticks)
-        parts = np.split(angles, np.cumsum([math.prod(shape) for shape in self._shapes.values()]))
-        named = zip(self._shapes.items(), parts, strict=False)
-        return JointCommand(**{name: part.reshape(shape) for (name, shape), part in named})
+        return joint_command(self.angles(ticks), self._shapes)
 
     def plain(self, command: JointCommand) -> JointCommand:
         """A copy of a command of one robot; CommandError if it is anything else."""

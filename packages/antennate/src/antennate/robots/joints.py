@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field
 
@@ -26,6 +26,7 @@ _Factor = Annotated[float, Field(gt=0, le=2)]
 class JointParams(Params):
     """One group of joints, in the order of the robot's joints."""
 
+    lists: ClassVar[tuple[str, ...]] = ("ids", "directions", "zeros")
     servo: ServoName = number("xc430_w240", "1", "paper: XC430-W240 in the body")
     """Model of the group's servos."""
     ids: tuple[_Id, ...] = number((), "1", "assumed: set by hand; joints from 1 if not given")
@@ -56,8 +57,11 @@ class JointParams(Params):
             name: What the group is called.
             count: Number of its joints.
         """
-        for what in ("ids", "directions", "zeros"):
-            _require_each(f"{name}.{what}", len(getattr(self, what)), count)
+        for what in self.lists:
+            if (found := len(getattr(self, what))) not in (0, count):
+                raise ValueError(
+                    f"{name}.{what}: expected one for each of the {count} joints, found {found}"
+                )
         for zero in self.zeros if math.isfinite(self.largest) else ():
             if not QUARTER <= zero <= STRAIGHT + QUARTER:
                 raise ValueError(
@@ -66,15 +70,10 @@ class JointParams(Params):
                 )
 
 
-def _require_each(name: str, found: int, count: int) -> None:
-    """Refuse a list that is not empty and has not one entry for each of `count` joints."""
-    if found not in (0, count):
-        raise ValueError(f"{name}: expected one for each of the {count} joints, found {found}")
-
-
 class YawParams(JointParams):
     """The yaw joints between links, head first."""
 
+    lists: ClassVar[tuple[str, ...]] = (*JointParams.lists, "backlash")
     limit: float | None = number(
         None, "rad", "assumed: as far as neighbouring legs stay apart", gt=0, le=_RIGHT_ANGLE
     )
@@ -84,11 +83,6 @@ class YawParams(JointParams):
     )
     """Angle that each link turns freely between the ends of the play behind its servo's horn; none
     if empty. The servo measures the horn."""
-
-    def require_lists(self, name: str, count: int) -> None:
-        """Refuse lists of a wrong length, that of the backlash too."""
-        super().require_lists(name, count)
-        _require_each(f"{name}.backlash", len(self.backlash), count)
 
     @property
     def largest(self) -> float:
@@ -117,6 +111,7 @@ class PitchParams(JointParams):
 class LegParams(JointParams):
     """The legs of all links, head first, left before right."""
 
+    lists: ClassVar[tuple[str, ...]] = (*JointParams.lists, "friction_factors")
     kind: Literal["rolling", "lifting"] = number("rolling", "1", "paper: O-legs")
     """Rolling legs turn about the pitch axis without end, lifting legs about the roll axis."""
     fastest: float = number(
@@ -133,11 +128,6 @@ class LegParams(JointParams):
     """Distance of a lifting leg's foot from its axis at 0 rad, to the side."""
     friction_factors: tuple[_Factor, ...] = number((), "1", "assumed: all 1, which empty means")
     """Friction of each leg on the floor over `leg_friction` of the robot."""
-
-    def require_lists(self, name: str, count: int) -> None:
-        """Refuse lists of a wrong length, that of the factors of friction too."""
-        super().require_lists(name, count)
-        _require_each(f"{name}.friction_factors", len(self.friction_factors), count)
 
     @property
     def largest(self) -> float:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-import struct
 from collections.abc import Sequence
+from functools import lru_cache
+from typing import Any
 
 from antennate.sim.frames import transforms
+from antennate.telemetry.cdr import MessageType
 from antennate.telemetry.topics import HEADER_SCHEMA, TURN_SCHEMA
 from antennate.types import Floats
 
@@ -25,9 +27,6 @@ MSG: geometry_msgs/Transform
 geometry_msgs/Vector3 translation
 geometry_msgs/Quaternion rotation
 {HEADER_SCHEMA}{TURN_SCHEMA}"""
-_HEADER = b"\0\1\0\0"
-"""Plain CDR, little end first, as of `telemetry.cdr`; alignment counts from behind it."""
-_STAMP, _VALUES = struct.Struct("<iI"), struct.Struct("<7d")
 
 
 def encoded(
@@ -43,12 +42,16 @@ def encoded(
         placed: Whether the head has a place in the world, which a real robot does not know.
     """
     rows = [i for i, parent in enumerate(parents) if placed or parent >= 0]
-    values, time = transforms(places, parents), _STAMP.pack(*divmod(stamp, 10**9))
-    body = bytearray(struct.pack("<I", len(rows)))
+    time, values = divmod(stamp, 10**9), transforms(places, parents)
+    parts: list[Any] = [len(rows)]
     for row in rows:
-        body += bytes(-len(body) % 4) + time
-        for name in (WORLD if parents[row] < 0 else names[parents[row]], names[row]):
-            text = name.encode() + b"\0"
-            body += bytes(-len(body) % 4) + struct.pack("<I", len(text)) + text
-        body += bytes(-len(body) % 8) + _VALUES.pack(*values[row])
-    return _HEADER + body
+        above = WORLD if parents[row] < 0 else names[parents[row]]
+        parts += [*time, above, names[row], values[row].tolist()]
+    return _of(len(rows)).encode(*parts)
+
+
+@lru_cache
+def _of(count: int) -> MessageType:
+    """The type of messages with so many links, without nesting."""
+    link = "int32 s{0}\nuint32 n{0}\nstring above{0}\nstring link{0}\nfloat64[7] place{0}"
+    return MessageType(TYPE, "\n".join(["uint32 count", *map(link.format, range(count))]))

@@ -12,45 +12,12 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from antennate.control.gait import Gait
 from antennate.control.rule_controller import RuleController
 from antennate.hardware.driving.teleop import KeyRule
 from antennate.params.control import ControlParams
 from antennate.params.hardware import GoalsParams
 from antennate.robots.spec import RobotSpec
-from antennate.types import AntennaFrame, Bools, Floats, Ints, JointCommand, Maneuver
-
-
-class GoalMoves:
-    """Joint targets that are the goals; HOLD keeps the last ones that were walked.
-
-    Args:
-        control: Numbers of the control, whose gait stands at first.
-        robot: The robot.
-
-    Attributes:
-        phase: Gait phase, which is not known, shape (1,).
-        newest: The newest goals in the order of the robot's joints [rad], None before the first.
-    """
-
-    def __init__(self, control: ControlParams, robot: RobotSpec) -> None:
-        self._shapes = robot.command_shapes()
-        stand = Gait(control.gait, robot, 1, control.period)
-        self._command = stand.step(np.full(1, int(Maneuver.HOLD)))
-        self.phase: Floats = np.full(1, math.nan)
-        self.newest: Sequence[float] | None = None
-
-    def reset(self, rows: Ints | Bools, phase: Floats | float = 0.0) -> None:
-        """Do nothing: goals say where each joint is to be."""
-
-    def step(self, maneuver: Ints, turn_offset: Floats | float | None = None) -> JointCommand:
-        """The targets, shape (1,)."""
-        if self.newest is not None and maneuver[0] != Maneuver.HOLD:
-            ends = np.cumsum([math.prod(shape) for shape in self._shapes.values()])
-            parts = np.split(np.array(self.newest, float), ends[:-1])
-            named = zip(self._shapes.items(), parts, strict=True)
-            self._command = JointCommand(**{n: part.reshape(shape) for (n, shape), part in named})
-        return self._command
+from antennate.types import AntennaFrame, Floats, JointCommand, Maneuver, joint_command
 
 
 class GoalController(RuleController):
@@ -73,17 +40,28 @@ class GoalController(RuleController):
         goals: Callable[[], tuple[Sequence[float], float] | None],
         clock: Callable[[], float],
     ) -> None:
-        self._by_goals, self._moves = KeyRule(control), GoalMoves(control, robot)
-        super().__init__(self._by_goals, control, robot, 1, self._moves)
+        self._by_goals = KeyRule(control)
+        super().__init__(self._by_goals, control, robot, 1)
         self._params, self._goals, self._clock = params, goals, clock
-        self._came = -math.inf
+        self._shapes, self._came = robot.command_shapes(), -math.inf
+        self._newest: Sequence[float] | None = None
+        self._command: JointCommand | None = None
+
+    @property
+    def phase(self) -> Floats:
+        """Gait phase: none is known."""
+        return np.full(1, math.nan)
 
     def step(self, frame: AntennaFrame) -> JointCommand:
-        """One control period: the command for this frame."""
+        """One control period: the command for this frame; HOLD keeps the last goals walked."""
         now = self._clock()
         if (found := self._goals()) is not None:
-            self._moves.newest, age = found
+            self._newest, age = found
             self._came = now - age
         fresh = now - self._came <= self._params.release
         self._by_goals.wanted = Maneuver.FORWARD if fresh else Maneuver.HOLD
-        return super().step(frame)
+        stand = super().step(frame)
+        if self._newest is not None and self.maneuver[0] != Maneuver.HOLD:
+            self._command = joint_command(np.array(self._newest, float), self._shapes)
+        self._command = self._command or stand
+        return self._command

@@ -20,7 +20,7 @@ from antennate.hardware.driving.teleop import KeyRule
 from antennate.hardware.safety.session import Session
 from antennate.params.control import ControlParams
 from antennate.robots.spec import RobotSpec
-from antennate.types import AntennaFrame, Floats, JointCommand, Maneuver, State
+from antennate.types import AntennaFrame, Floats, JointCommand, Maneuver, State, joint_command
 
 _REST = 0.5
 """Time in which the robot stands after the last step [s] (assumed)."""
@@ -215,6 +215,4 @@ class ProtocolController(RuleController):
             session.note, session.events = course.note, course.events
         self._wish.wanted = course.maneuver
         super().step(frame)  # contact and level of the readings
-        ends = np.cumsum([math.prod(shape) for shape in self._shapes.values()])
-        pieces = zip(self._shapes.items(), np.split(course.angles, ends[:-1]), strict=True)
-        return JointCommand(**{name: piece.reshape(shape) for (name, shape), piece in pieces})
+        return joint_command(course.angles, self._shapes)

@@ -50,14 +50,12 @@ class Clock:
         at_error: Half the 95 % interval of `at` [s].
         drift_error: Half the 95 % interval of `drift` [1].
         correlation: Of the yaw rates.
-        rival: Correlation at the best of other lags.
     """
 
     centre: float
     at: float
     drift: float
     correlation: float
-    rival: float
     at_error: float = math.nan
     drift_error: float = math.nan
 
@@ -114,7 +112,7 @@ def align(name: Path, table: Course, log: Course, weakest: float) -> Clock:
     peak, rival = float(lags[lag]), float(abs(lags[others]).max(initial=0.0))
     _judge(name, peak, rival, weakest)
     at = float(grid[0] + (lag - count) * _STEP)
-    return _refined(table, log, Clock(centre, at, float(at_drift[lag]), peak, rival))
+    return _refined(table, log, Clock(centre, at, float(at_drift[lag]), peak))
 
 
 def _correlations(ours: Floats, theirs: Floats) -> Floats:
