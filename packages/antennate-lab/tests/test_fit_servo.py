@@ -19,17 +19,22 @@ SERVO = "servos.xl330_m288"
 NUMBERS = ("gain_divisor", "armature", "friction", "load_friction")
 
 
-def fitted(folder: Path, *recordings: Path) -> tuple[ServoFit, RobotSpec]:
+def fitted(
+    folder: Path, *recordings: Path, robot: str | Path = "scuttle"
+) -> tuple[ServoFit, RobotSpec]:
     """What a fit has found, and the robot of its file."""
     files = [str(each) for each in recordings]
-    run = antennate.run("fit", log=files, servo="xl330_m288", out=folder)
+    run = antennate.run("fit", log=files, servo="xl330_m288", robot=str(robot), out=folder)
     return run.outcome, RobotSpec.named(folder / "robot.toml")
 
 
 def test_servo_of_the_twin_is_found_from_two_recordings(tmp_path: Path) -> None:
     """The twin's motor is another implementation, with the 128 of the manual and no friction."""
     files = [of_twin(tmp_path / f"{gain}.json", 1200, gain, 1.0, 1.6) for gain in (300, 500)]
-    fit, robot = fitted(tmp_path / "out", *files)
+    (own := tmp_path / "own.toml").write_text(
+        f"[{SERVO}]\np_gain = 800.0\ndelay = 0.004\nstall_torque = 0.7  # hot\n"
+    )
+    fit, robot = fitted(tmp_path / "out", *files, robot=own)
     servo, true = robot.servos.xl330_m288, XL330Params()
     assert servo.gain_divisor == pytest.approx(128.0, rel=0.02)
     assert servo.armature == pytest.approx(true.armature, rel=0.02)
@@ -37,7 +42,11 @@ def test_servo_of_the_twin_is_found_from_two_recordings(tmp_path: Path) -> None:
     rows = {row.name.rpartition(".")[2]: row for row in fit.rows}
     assert {name for name, row in rows.items() if row.told} == {*NUMBERS}
     assert "known weight" in rows["stall_torque"].record  # none hangs on it
-    assert (servo.stall_torque, servo.no_load_speed) == true.datasheet
+    assert (servo.stall_torque, servo.p_gain, servo.delay) == (0.7, 800.0, 0.004)  # as they were
+    (warning,) = fit.result().warnings
+    assert warning == (
+        f"{SERVO}.stall_torque stays 0.7, though the others were found with {true.datasheet[0]:g}"
+    )
     assert {each.name for each in robot.fitted} == {f"{SERVO}.{name}" for name in NUMBERS}
     for each in robot.fitted:
         assert each.low <= rows[each.name.rpartition(".")[2]].value <= each.high
@@ -52,7 +61,8 @@ def test_servo_of_the_twin_is_found_from_two_recordings(tmp_path: Path) -> None:
     [
         (("a.json", "b.json"), (), "servo: expected the model that was recorded, one of the robot"),
         (("a.json", "b.json"), ("--servo", "xl430_w250"), "xl330_m288, found xl430_w250"),
-        (("a.json",), ("--servo", "xl330_m288"), "a.json: expected two recordings or more"),
+        (("a.json", "a.json"), ("--servo", "xl330_m288"), "a.json: expected two recordings or"),
+        (("no.json", "a.json"), ("--servo", "xl330_m288"), "no.json: expected a readable file"),
         (("a.json", "b.json"), ("--seed", "3"), "seed: expected the default, as recordings of"),
         (("a.json", "b.json"), ("--leave-out", "yaw1"), "leave_out: expected the default"),
         (("a.json", "log.mcap"), (), "expected logs or recordings of a servo, found both, as"),

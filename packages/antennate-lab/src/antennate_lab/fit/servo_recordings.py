@@ -74,7 +74,7 @@ def _is_json(path: Path) -> bool:
         with open_regular(path) as file:
             return file.read(64).lstrip(b"\xef\xbb\xbf \t\r\n")[:1] in (b"{", b"[")
     except OSError:
-        return False
+        return path.suffix.lower() == ".json"  # its reader says why
 
 
 @dataclass(frozen=True)
@@ -126,18 +126,20 @@ def run(config: FitConfig, on_step: OnStep = no_step) -> ServoFit:
     """
     robot = config.described
     names = ", ".join(dict.fromkeys(robot.servo_names))
-    first, *others = config.log
     if config.servo is None or config.servo not in robot.servo_names:
         raise BadInputError(
             f"servo: expected the model that was recorded, one of the robot's: {names}, found "
             f"{config.servo or 'none'}"
         )
-    if not others:
+    if len({Path(name).resolve() for name in config.log}) < 2:
         raise BadInputError(
-            f"{first}: expected two recordings or more, so that each can judge a fit to "
+            f"{config.log[0]}: expected two recordings or more, so that each can judge a fit to "
             "the others, found one; `antennate servo --fit` takes it"
         )
-    servos = ServosParams().model_copy(update={config.servo: robot.servos.of(config.servo)})
+    given = robot.servos.of(config.servo)
+    fields = type(given).model_fields
+    usual = {name: fields[name].default for name in ("p_gain", "delay")}  # recordings have theirs
+    servos = ServosParams().model_copy(update={config.servo: given.model_copy(update=usual)})
     own = ServoConfig(recording=config.log, servo=config.servo, servos=servos, fit=True)
     outcome = servo.run(own, on_step)
     models = {each.name: each for each in outcome.result().models}
@@ -147,11 +149,11 @@ def run(config: FitConfig, on_step: OnStep = no_step) -> ServoFit:
     if "stall_torque" not in model.free or not all(each.told for each in found):
         model = models["data sheet + friction"]
         found = _estimates(outcome, model, chosen)
-    given, count = models["as given"].held_out_deg, f"{len(config.log)} recordings"
+    before, count = models["as given"].held_out_deg, f"{len(config.log)} recordings"
     steps = [
-        StepRow(log=count, step=part, fitted=False, error_before_deg=before, error_deg=after)
+        StepRow(log=count, step=part, fitted=False, error_before_deg=was, error_deg=after)
         for part, after in model.held_out_deg.items()
-        if after is not None and (before := given[part]) is not None
+        if after is not None and (was := before[part]) is not None
     ]
     warnings = _beside(model, found) + [each.rstrip(".") for each in stalls(outcome.result())]
     return ServoFit(config, outcome, found, outcome.result().recordings, steps, warnings)
