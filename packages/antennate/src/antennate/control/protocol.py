@@ -22,7 +22,7 @@ from pydantic import Field, model_validator
 from antennate.control.gait import Gait
 from antennate.errors import ConfigError
 from antennate.messages import nearest, shown
-from antennate.params.base import Params, number, read_file
+from antennate.params.base import Params, number, own_file, read_file
 from antennate.params.control import ControlParams
 from antennate.robots.spec import RobotSpec
 from antennate.types import Floats, Maneuver, joint_angles
@@ -129,13 +129,7 @@ class Protocol(Params):
         """
         if text in PROTOCOLS:
             return read_file(Path(__file__).with_name(f"{text}.toml"), cls)
-        if not text.endswith(".toml"):
-            known = ", ".join(PROTOCOLS)
-            raise ConfigError(
-                f"--protocol: expected {known} or a TOML file{nearest(text, PROTOCOLS)}, found "
-                f"{shown(text)}"
-            )
-        return read_file(Path(text), cls)
+        return read_file(own_file("--protocol", text, PROTOCOLS), cls)
 
     def made_for(self, robot: RobotSpec, control: ControlParams) -> Self:
         """The protocol of one robot: a step for each joint, each with its name, all in its limits.

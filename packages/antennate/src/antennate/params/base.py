@@ -24,6 +24,7 @@ from pydantic import (
 
 from antennate.errors import BadInputError, ConfigError
 from antennate.files import TOO_LONG, read_toml
+from antennate.messages import nearest, shown
 from antennate.params.faults import Unread, describe, group_of
 
 LARGEST_SEED = 2**62
@@ -258,6 +259,21 @@ LARGEST_FILE = 1_000_000
 """Most bytes of a configuration file."""
 
 Config = TypeVar("Config", bound=Params)
+
+
+def own_file(flag: str, text: str, known: Collection[str], folder: Path = Path()) -> Path:
+    """The file that stands in place of a known name; a relative path starts at the folder.
+
+    Raises:
+        ConfigError: It is no TOML file, and there is no such file.
+    """
+    path = folder / text
+    if not text or (path.suffix != ".toml" and not path.exists()):
+        raise ConfigError(
+            f"{flag}: expected {', '.join(known)} or a TOML file{nearest(text, known)}, found "
+            f"{shown(text) if text else 'nothing'}"
+        )
+    return path
 
 
 def read_file(path: Path, model: type[Config]) -> Config:

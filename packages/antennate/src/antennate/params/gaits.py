@@ -7,9 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, ClassVar, Self
 
-from antennate.errors import ConfigError
-from antennate.messages import nearest, shown
-from antennate.params.base import Params, number, read_file
+from antennate.params.base import Params, number, own_file, read_file
 
 
 class LiftParams(Params):
@@ -134,10 +132,4 @@ class GaitParams(Params):
         """
         if (table := GAITS.get(str(text))) is not None:
             return cls.model_validate(table)
-        path = folder / text
-        if not str(text) or (path.suffix != ".toml" and not path.exists()):
-            raise ConfigError(
-                f"--gait: expected {', '.join(GAITS)} or a TOML file{nearest(str(text), GAITS)}, "
-                f"found {shown(str(text))}"
-            )
-        return read_file(path, cls)
+        return read_file(own_file("--gait", str(text), GAITS, folder), cls)

@@ -15,8 +15,8 @@ from pydantic import SerializerFunctionWrapHandler, model_serializer, model_vali
 
 from antennate import checks
 from antennate.errors import ConfigError
-from antennate.messages import nearest, shown
-from antennate.params.base import Params, number, read_file
+from antennate.messages import shown
+from antennate.params.base import Params, number, own_file, read_file
 from antennate.params.scene import GRAVITY
 from antennate.robots.antenna import BASE, AntennaSpec
 from antennate.robots.imu import ImuParams
@@ -124,18 +124,8 @@ class RobotSpec(Params):
         """
         if str(text) in ROBOTS:
             return read_file(Path(__file__).with_name(f"{text}.toml"), cls)
-        if text == "":
-            raise ConfigError(
-                f"--robot: expected {', '.join(ROBOTS)} or a TOML file, found nothing"
-            )
-        path = folder / checks.path("robot", text)
-        if path.suffix != ".toml" and not path.exists():
-            known = ", ".join(ROBOTS)
-            raise ConfigError(
-                f"--robot: expected {known} or a TOML file{nearest(str(text), ROBOTS)}, found "
-                f"{shown(str(text))}"
-            )
-        return read_file(path, cls)
+        own = str(text and checks.path("robot", text))
+        return read_file(own_file("--robot", own, ROBOTS, folder), cls)
 
     @property
     def yaw_count(self) -> int:
