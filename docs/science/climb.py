@@ -192,7 +192,9 @@ def outcome_of(path: Path) -> ClimbOutcome:
         sensing=max((row.trial + 1 for row in felt), default=0),
         seed=rows[0].seed - round(10_000 * (rows[0].height_m or 0.0)),
     )
-    return Found(config, rows, {}, False, ClimbRow, summarise)
+    return Found(
+        config, rows, {}, False, ClimbRow, lambda found: summarise(found.config, found.frame)
+    )
 
 
 def markdown(table: Table) -> str:
