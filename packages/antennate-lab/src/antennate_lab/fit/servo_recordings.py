@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from scipy.special import stdtrit
 
 from antennate.errors import BadInputError
 from antennate.files import open_regular
@@ -27,14 +28,10 @@ from antennate_lab.fit.parameters import Parameter, parameters
 from antennate_lab.fit.result import FitResult, LogSummary, ParameterRow, StepRow
 from antennate_lab.servo import run as servo
 from antennate_lab.servo.experiment import stalls
-from antennate_lab.servo.recording import ServoConfig
-from antennate_lab.servo.result import ModelSummary, RecordingSummary
+from antennate_lab.servo.recording import Recording, ServoConfig
+from antennate_lab.servo.result import ModelSummary
 
-_OF_LOGS = ("leave_out", "robots", "seed")
-"""Settings that recordings of a servo do not read."""
 _RECORD = "lift a known weight with this servo on a bench, at several gains"
-_ALIKE = 0.02
-"""Values of a number that differ by a smaller share are alike."""
 
 
 def are_given(config: FitConfig) -> bool:
@@ -56,15 +53,12 @@ def are_given(config: FitConfig) -> bool:
             f"log: expected logs or recordings of a servo, found both, as {texts[0]}; fit one, "
             "then the other with --robot FOLDER/robot.toml of the first"
         )
-    if texts and (other := next(iter(changes(config, _OF_LOGS)), None)):
+    what, others = (
+        ("recordings", ("leave_out", "robots", "seed")) if texts else ("logs", ("servo",))
+    )
+    for name, _ in changes(config, others):
         raise BadInputError(
-            f"{other[0]}: expected the default, as recordings of a servo do not read it, found "
-            "another"
-        )
-    if config.servo and not texts:
-        raise BadInputError(
-            f"servo: expected recordings of a servo (JSON), as logs name theirs, found "
-            f"{config.servo}"
+            f"{name}: expected the default, as {what} do not read it, found another"
         )
     return bool(texts)
 
@@ -84,7 +78,7 @@ class ServoFit:
     Attributes:
         servo: What `servo` has found in them.
         found: What is known of each number of the servo.
-        recordings: Each recording with the last model of `servo`.
+        recordings: The recordings.
         steps: A row for each part that was left out in turn.
         warnings: What is wrong.
     """
@@ -92,7 +86,7 @@ class ServoFit:
     config: FitConfig
     servo: servo.ServoOutcome
     found: list[Estimate]
-    recordings: list[RecordingSummary]
+    recordings: list[Recording]
     steps: list[StepRow]
     warnings: list[str]
 
@@ -125,8 +119,8 @@ def run(config: FitConfig, on_step: OnStep = no_step) -> ServoFit:
         BadInputError: They cannot be of that servo, or are too few for an interval.
     """
     robot = config.described
-    names = ", ".join(dict.fromkeys(robot.servo_names))
     if config.servo is None or config.servo not in robot.servo_names:
+        names = ", ".join(dict.fromkeys(robot.servo_names))
         raise BadInputError(
             f"servo: expected the model that was recorded, one of the robot's: {names}, found "
             f"{config.servo or 'none'}"
@@ -137,8 +131,7 @@ def run(config: FitConfig, on_step: OnStep = no_step) -> ServoFit:
             "the others, found one; `antennate servo --fit` takes it"
         )
     given = robot.servos.of(config.servo)
-    fields = type(given).model_fields
-    usual = {name: fields[name].default for name in ("p_gain", "delay")}  # recordings have theirs
+    usual = type(given)().model_dump(include={"p_gain", "delay"})  # recordings have their own
     servos = ServosParams().model_copy(update={config.servo: given.model_copy(update=usual)})
     own = ServoConfig(recording=config.log, servo=config.servo, servos=servos, fit=True)
     outcome = servo.run(own, on_step)
@@ -149,18 +142,15 @@ def run(config: FitConfig, on_step: OnStep = no_step) -> ServoFit:
     if "stall_torque" not in model.free or not all(each.told for each in found):
         model = models["data sheet + friction"]
         found = _estimates(outcome, model, chosen)
-    before, count = models["as given"].held_out_deg, f"{len(config.log)} recordings"
+    pairs = zip(models["as given"].held_out_deg.items(), model.held_out_deg.values(), strict=True)
+    count = f"{len(config.log)} recordings"
     steps = [
-        StepRow(log=count, step=part, fitted=False, error_before_deg=was, error_deg=after)
-        for part, after in model.held_out_deg.items()
-        if after is not None and (was := before[part]) is not None
+        StepRow(log=count, step=part, fitted=False, error_before_deg=before, error_deg=after)
+        for (part, before), after in pairs
+        if before is not None and after is not None
     ]
     warnings = _beside(model, found) + [each.rstrip(".") for each in stalls(outcome.result())]
-    return ServoFit(config, outcome, found, outcome.result().recordings, steps, warnings)
-
-
-def _name(parameter: Parameter) -> str:
-    return parameter.path.rpartition(".")[2]
+    return ServoFit(config, outcome, found, outcome.recordings, steps, warnings)
 
 
 def _estimates(
@@ -169,40 +159,31 @@ def _estimates(
     """Estimates of a model's numbers, by the half of their 90 % intervals on the search's scale."""
     divisors = [d for each in outcome.recordings if (d := each.divisor()) is not None]
     found = []
-    for each in chosen:
-        scale, value, groups = each.scale, getattr(model, _name(each)), outcome.groups
-        ends: Floats = np.array(model.interval_95.get(_name(each), (np.nan, np.nan)))
-        if each.path.endswith("gain_divisor") and "gain_divisor" not in model.free:
+    for name, each in zip(MODEL_NUMBERS, chosen, strict=True):
+        scale, value, groups = each.scale, getattr(model, name), outcome.groups
+        ends: Floats = np.array(model.interval_95.get(name, (np.nan, np.nan)))
+        if name == "gain_divisor" and name not in model.free:
             groups = len(divisors)
             left = [float(np.mean(divisors[:i] + divisors[i + 1 :])) for i in range(groups)]
             ends = value + jackknife95(0.0, np.array(left))
         if scale.log:
             value, ends = math.log(value), np.log(ends)
-        half = float(abs(ends - value).max()) * _narrower(groups)  # one end may be at a bound
+        narrower = stdtrit(groups - 1, 0.95) / stdtrit(groups - 1, 0.975)  # NaN of one group
+        half = float(abs(ends - value).max() * narrower)  # one end may be at a bound
         known = LEVEL * scale.spread
         told = half < TOLD * known
         middle = value if told else each.searched(each.start)
         low, high = middle + np.array([-1.0, 1.0]) * (half if told else known)
         interval = (math.exp(low), math.exp(high)) if scale.log else (max(low, 0.0), float(high))
-        value = (math.exp(value) if scale.log else value) if told else each.start
+        value = getattr(model, name) if told else each.start
         found.append(Estimate(each, value, interval, told, "bench", np.zeros(1)))
     return found
-
-
-def _narrower(groups: int) -> float:
-    """Width of a 90 % interval over that of 95 %, of a jackknife over groups."""
-    if groups < 2:
-        return math.nan
-    from scipy.special import stdtrit
-
-    return float(stdtrit(groups - 1, 0.95) / stdtrit(groups - 1, 0.975))
 
 
 def _beside(model: ModelSummary, found: Sequence[Estimate]) -> list[str]:
     """Numbers that stay as they were although the others were fitted with another value."""
     return [
-        f"{each.parameter.name} stays {each.value:.4g}, though the others were found with "
-        f"{getattr(model, _name(each.parameter)):.4g}"
-        for each in found
-        if not each.told and abs(getattr(model, _name(each.parameter)) / each.value - 1.0) > _ALIKE
+        f"{each.parameter.name} stays {each.value:g}, though the others were found with {used:.4g}"
+        for name, each in zip(MODEL_NUMBERS, found, strict=True)
+        if not each.told and (used := getattr(model, name)) != each.value
     ]
