@@ -44,6 +44,17 @@ def test_shipped_protocol_moves_every_joint_within_its_limits(name: str) -> None
         assert (speeds <= np.array(robot.fastest)).all()
 
 
+@pytest.mark.parametrize("name", ROBOTS)
+def test_short_protocol_moves_each_joint_alone_in_the_air_in_little_more_than_a_minute(
+    name: str,
+) -> None:
+    robot = RobotSpec.named(name)
+    protocol = Protocol.named("check").made_for(robot, CONTROL)
+    assert [step.joint for step in protocol.steps] == list(robot.joint_names)
+    assert {step.place for step in protocol.steps} == {"hanging"}
+    assert sum(step.seconds + protocol.settle for step in protocol.steps) <= 70.0
+
+
 def test_sweep_crosses_zero_as_often_as_its_frequencies_say() -> None:
     # f = 0.1 * 100 ** (t / 6) has the integral 0.1 * 6 * 99 / ln 100 over 6 s
     periods = 0.1 * 6.0 * 99.0 / math.log(100.0)
@@ -129,7 +140,7 @@ def test_protocol_has_steps_of_different_names() -> None:
         Protocol()
     with pytest.raises(ConfigError, match="hold twice"):
         made({}, {})
-    with pytest.raises(ConfigError, match="expected identify or a TOML file"):
+    with pytest.raises(ConfigError, match="expected identify, check or a TOML file"):
         Protocol.named("identfy")
 
 

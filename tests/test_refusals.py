@@ -139,7 +139,7 @@ drive teleop --controller open :: expected a parameter that drive teleop reads, 
 drive teleop --protocol identify :: expected a parameter that drive teleop reads, found this one
 drive --protocol identify --controller open :: found open :: , but a protocol takes its place
 drive --protocol identify --control.gait.frequency 0.4 :: found 0.4 :: , but a protocol does not read it
-drive --protocol identfy :: --protocol: expected identify or a TOML file (did you mean identify?) :: found 'identfy'
+drive --protocol identfy :: --protocol: expected identify, check or a TOML file (did you mean identify?) :: found 'identfy'
 drive --protocol missing.toml :: missing.toml: expected a readable file
 drive --protocol identify :: --esp32: expected a serial port, found none
 drive --tell orders :: --tell: expected --protocol beside it, found none
@@ -263,6 +263,10 @@ robot --export urdf --robot hexpod :: --robot: expected scuttle, :: (did you mea
 robot --scene tunnel :: --scene: expected --export mjcf beside it, found none
 robot one two :: expected flags only, found 'two'
 doctor :: --esp32 PORT, --bus PORT or both
+doctor --compare fit.toml :: --compare: expected FILE and LOG, found no log :: drive --protocol check` records one
+doctor drive.mcap :: --log: expected --compare
+doctor --compare nowhere.toml drive.mcap :: nowhere.toml: :: No such file
+doctor --compare hexapod drive.mcap :: hexapod: expected intervals of servos, tables [[fitted]] :: found none
 doctor --bus /dev/null --esp32 /dev/null :: expected two ports
 drive --esp32 /dev/null --bus /dev/null :: expected two ports, found /dev/null twice
 doctor --esp32 /dev/null --fix :: --fix: expected --bus PORT

@@ -129,7 +129,7 @@ def test_log_of_another_robot_is_refused(tmp_path: Path) -> None:
     """Links and servo models of a log and of the robot's file have to agree."""
     path = write(tmp_path / "drive.mcap", SMALL, sweeps(SMALL, "leg_l0"))
     longer = RobotSpec(links=3, antennae={"kind": "none"})  # type: ignore[arg-type]
-    with pytest.raises(BadInputError, match="expected the robot of --robot with links 3, found 2"):
+    with pytest.raises(BadInputError, match="expected the robot of the file with links 3, found 2"):
         recording.read(path, longer)
     other = RobotSpec.model_validate(
         SMALL.model_dump() | {"legs": {"servo": "xl430_w250", "fastest": 4.5}}

@@ -111,7 +111,7 @@ def _require_same(path: Path, logged: RobotSpec, robot: RobotSpec) -> None:
         ours, theirs = getattr(robot, name), getattr(logged, name)
         if ours != theirs:
             raise BadInputError(
-                f"{path}: expected the robot of --robot with {name} {_shown(ours, theirs)}, found "
+                f"{path}: expected the robot of the file with {name} {_shown(ours, theirs)}, found "
                 f"{_shown(theirs, ours)}; give the file of the robot that was driven"
             )
 

@@ -11,17 +11,25 @@ from typing import Any
 from pydantic.dataclasses import dataclass
 
 from antennate.cli.options import option
-from antennate.cli.results import ResultOptions, folder_for
+from antennate.cli.results import ResultOptions, folder_for, log_of
 from antennate.cli.robot import USUAL, PortOptions, at_hand, key_of, parse_robot, require_two_ports
-from antennate.cli.terminal import BAD_INPUT, OK, console, stop_signals, write_result
-from antennate.errors import ConfigError
+from antennate.cli.terminal import (
+    BAD_INPUT,
+    OK,
+    console,
+    progress,
+    stop_signals,
+    write_result,
+)
+from antennate.errors import ConfigError, MissingPackageError
 from antennate.hardware.config import DoctorConfig
 from antennate.hardware.doctor.check import Opener, Row, opener_of
 from antennate.hardware.doctor.checkup import Checkup, examine
 from antennate.hardware.doctor.fix import Change, apply, plan
 from antennate.hardware.setup.zeros import forgotten
 from antennate.host import HostClock
-from antennate.messages import one_line
+from antennate.lookup import installed
+from antennate.messages import INSTALLATION, one_line, typed
 from antennate.studies.formats import to_json
 from antennate.studies.report import View
 from antennate.studies.tables import Table
@@ -31,8 +39,14 @@ Examine the antenna board and the servo bus of a robot at rest, or of its twin: 
 check, with the cure for what is not good. Torque never comes on. Either port may be left out.
 
 Nothing is written without --fix, which asks before each change of an id, a speed, an
-operating mode or a return delay, and reads it back. The exit code is 2 if anything is bad."""
+operating mode or a return delay, and reads it back. The exit code is 2 if anything is bad.
+
+--compare FILE LOG looks whether each joint still behaves as fitted, after a repair for example:
+FILE is the robot of `antennate fit`, LOG what `antennate drive --protocol check` has recorded. A
+joint whose lag, gain, friction or backlash is out of its range warns. No port is needed."""
 _STYLES = {"ok": "green", "note": "cyan", "warn": "yellow", "bad": "bold red"}
+_LOGGED = ("log", "joint")
+"""Parts of the rows of --compare."""
 _ROUNDS = 4
 """Servos that change their id or speed are looked at anew before the rest is put right."""
 
@@ -44,12 +58,26 @@ class DoctorOptions(ResultOptions, PortOptions):
     fix: bool = option(False, "put right what can be, asking before each change")
     yes: bool = option(False, "answer yes to all that --fix asks", needs=["--fix"])
     out: Path | None = option(None, "folder for result.json; none if not given", "FOLDER")
+    compare: Path | None = option(None, "robot that was fitted; LOG is held against it", "FILE")
+    log: Path | None = option(
+        None,
+        "log of a protocol, or the folder of its drive",
+        "RUN|LOG",
+        ["--compare"],
+        positional=True,
+        optional=True,
+    )
 
 
 def command(argv: Sequence[str]) -> int:
     """Examine, put right what was asked for, and tell."""
     config, options = parse_robot("doctor", DESCRIPTION, DoctorConfig, argv, DoctorOptions)
-    if not (options.esp32 or options.bus):
+    if options.compare and not options.log:
+        raise ConfigError(
+            "--compare: expected FILE and LOG, found no log; "
+            f"`{typed('drive')} --protocol check` records one"
+        )
+    if not (options.esp32 or options.bus or options.compare):
         raise ConfigError(
             f"expected --esp32 PORT, --bus PORT or both, found none{at_hand(options)}"
         )
@@ -62,6 +90,8 @@ def command(argv: Sequence[str]) -> int:
     key = key_of(options)
     with folder_for(VIEW, options, config, argv) if options.out else nullcontext() as folder:
         checkup, changes = _examine(robot, options, key)
+        if options.compare and options.log:
+            checkup.rows += _compared(options.compare, log_of(options.log))
         result = checkup.result(changes)
         if folder is not None:
             folder.finish(result)
@@ -94,6 +124,19 @@ def _examine(
         else:
             sys.stderr.write("nothing was changed\n")
     return checkup, changes
+
+
+def _compared(file: Path, log: Path) -> list[Row]:
+    """A row for each joint of a log, which the laboratory holds against a fitted robot."""
+    points = list(installed("antennate.doctor"))
+    if not points:
+        raise MissingPackageError(
+            "--compare: expected the package antennate-lab, which has fit, found none; install it "
+            f"with {INSTALLATION}"
+        )
+    rows: Callable[..., list[Row]] = points[0].load()
+    with stop_signals(), progress("joints") as step:
+        return rows(file, log, step)
 
 
 def _fix(
@@ -158,12 +201,28 @@ def _show(rows: Sequence[Row]) -> None:
             one_line(row.cure),
         )
         output.print(line, soft_wrap=True)
-    sentence = Text(_sentence([row.grade for row in rows]))
+    sentence = Text(_sentence([(row.part, row.grade) for row in rows]))
     output.print(sentence, soft_wrap=not output.is_terminal)
 
 
-def _sentence(grades: Sequence[str]) -> str:
-    """What came out, in one sentence."""
+def _sentence(rows: Sequence[tuple[str, str]]) -> str:
+    """What came out of checks, by part and grade, in a sentence on ports and one on joints."""
+    grades = [grade for part, grade in rows if part not in _LOGGED]
+    joints = [grade for part, grade in rows if part == "joint"]
+    said = [_driven(grades)] if grades else []
+    if joints:
+        fitted, changed = joints.count("ok"), joints.count("warn")
+        rest = len(joints) - fitted - changed
+        said.append(
+            f"Of {len(joints)} joints {fitted} behave as fitted"
+            f"{f', {changed} do not' if changed else ''}"
+            f"{f', {rest} the log does not tell' if rest else ''}."
+        )
+    return " ".join(said)
+
+
+def _driven(grades: Sequence[str]) -> str:
+    """Whether the robot may be driven."""
     checks, bad, warnings, notes = len(grades), *map(grades.count, ("bad", "warn", "note"))
     assumed = f"; numbers assumed: {notes}" if notes else ""
     if bad:
@@ -183,7 +242,7 @@ def _tables(result: Mapping[str, Any]) -> Sequence[Table]:
 
 
 def _sentence_of(result: Mapping[str, Any]) -> str:
-    return _sentence([row["grade"] for row in result["rows"]])
+    return _sentence([(row["part"], row["grade"]) for row in result["rows"]])
 
 
 VIEW = View("doctor", DESCRIPTION, DoctorConfig, _tables, _sentence_of)

@@ -27,7 +27,7 @@ from antennate.params.control import ControlParams
 from antennate.robots.spec import RobotSpec
 from antennate.types import Floats, Maneuver, joint_angles
 
-PROTOCOLS = ("identify",)
+PROTOCOLS = ("identify", "check")
 """Protocols that are known by name; each is a file beside this one."""
 EACH = "each"
 """Stands for all joints of the robot, one after the other."""

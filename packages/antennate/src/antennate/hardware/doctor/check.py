@@ -28,7 +28,7 @@ class Row:
     """The result of one check.
 
     Attributes:
-        part: "robot", "bus" or "esp32".
+        part: "robot", "bus" or "esp32"; "log" or "joint" of a comparison.
         grade: "ok"; "note", a number is assumed; "warn", the robot may walk but not well; "bad",
             it must not.
         cure: What to do, empty if all is well.

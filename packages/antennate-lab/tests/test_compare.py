@@ -1,0 +1,197 @@
+"""`doctor --compare`: joints of a log beside the intervals of a fitted robot."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from protocol_logs import CONTROL, sweeps, write
+
+from antennate.cli import main
+from antennate.control.protocol import Step
+from antennate.errors import BadInputError
+from antennate.hardware.doctor.check import Row
+from antennate.robots.spec import RobotSpec
+from antennate.types import Floats
+from antennate_lab.fit import compare
+from antennate_lab.fit.simulated import Course, simulated
+
+ANTENNATE = [sys.executable, "-c", "import sys; from antennate.cli import main; sys.exit(main())"]
+LEGGED = 'links = 2\nmass = 0.8\n\n[antennae]\nkind = "none"\n'
+SMALL = RobotSpec(links=2, mass=0.8, antennae={"kind": "none"})  # type: ignore[arg-type]
+"""The robot of LEGGED."""
+
+
+def fitted(folder: Path, text: str, **intervals: tuple[float, float]) -> Path:
+    """A file as `fit` writes it, with intervals of a servo's numbers, or of other ones."""
+    blocks = [
+        f'[[fitted]]\nname = "{name}"\nlow = {low}\nhigh = {high}\nsource = "measured: drive"\n'
+        for name, (low, high) in intervals.items()
+    ]
+    path = folder / "fitted.toml"
+    path.write_text("\n".join([text, *blocks]), encoding="utf-8")
+    return path
+
+
+GAIN, FRICTION = "servos.xc430_w240.gain_divisor", "servos.xc430_w240.friction"
+KNOWN = {GAIN: (126.0, 130.0), FRICTION: (0.0, 0.002)}
+"""Intervals about the numbers of a new robot."""
+
+
+def compared(folder: Path, **numbers: float) -> Row:
+    """The row of the one joint of a log, its servo with other numbers than the file says."""
+    servos = {"xc430_w240": SMALL.servos.xc430_w240.model_dump() | numbers}
+    truth = RobotSpec.model_validate(SMALL.model_dump() | {"servos": servos})
+
+    def measured(step: Step, goals: Floats) -> Floats:
+        none = np.zeros((len(goals), 0))
+        course = Course(step.called, True, CONTROL.period, 0.0, goals, goals, none, none)
+        return simulated(truth, course).positions
+
+    log = write(folder / "drive.mcap", SMALL, sweeps(SMALL, "leg_l0"), measured)
+    whole, row = compare.rows(fitted(folder, LEGGED, **KNOWN), log)
+    assert (whole.part, whole.grade) == ("log", "warn")
+    assert whole.found == "no sweep of yaw1, leg_r0, leg_l1, leg_r1"
+    assert (row.part, row.check) == ("joint", "leg_l0")
+    return row
+
+
+def numbers_of(words: str) -> dict[str, float]:
+    """Numbers of a row by name."""
+    return {part.split()[0]: float(part.split()[1]) for part in words.split(", ")}
+
+
+def test_joint_that_nobody_touched_is_as_fitted(tmp_path: Path) -> None:
+    row = compared(tmp_path)
+    assert row.grade == "ok", row
+    assert numbers_of(row.found)["gain"] == pytest.approx(1.0, abs=0.01)
+    assert row.cure == ""
+
+
+@pytest.mark.parametrize(
+    ("change", "name", "value", "error"),
+    [
+        ({"gain_divisor": 256.0}, "gain", 0.5, 0.02),
+        ({"friction": 0.06}, "friction", 0.06, 0.01),
+    ],
+)
+def test_joint_that_was_changed_is_named(
+    tmp_path: Path, change: dict[str, float], name: str, value: float, error: float
+) -> None:
+    row = compared(tmp_path, **change)
+    assert row.grade == "warn", row
+    assert numbers_of(row.found)[name] == pytest.approx(value, abs=error)
+    assert f"{name} not as fitted" in row.cure
+
+
+def test_delay_that_came_is_named_as_lag(tmp_path: Path) -> None:
+    row = compared(tmp_path, delay=0.02)
+    assert row.grade == "warn", row
+    assert row.cure.startswith("lag not as fitted")
+    plain, late = (numbers_of(each.found)["lag"] for each in (compared_again(tmp_path), row))
+    assert late - plain == pytest.approx(20.0, abs=2.0)
+
+
+def compared_again(folder: Path) -> Row:
+    (folder / "again").mkdir()
+    return compared(folder / "again")
+
+
+def test_file_without_intervals_and_log_without_sweeps_are_refused(tmp_path: Path) -> None:
+    log = write(tmp_path / "drive.mcap", SMALL, sweeps(SMALL, "leg_l0"))
+    bare = fitted(tmp_path, LEGGED)
+    with pytest.raises(BadInputError, match=r"expected intervals of servos.*found none"):
+        compare.rows(bare, log)
+    longer = fitted(tmp_path, LEGGED.replace("links = 2", "links = 3"), **KNOWN)
+    with pytest.raises(BadInputError, match="with links 3, found 2"):
+        compare.rows(longer, log)
+    stood = sweeps(SMALL, "leg_l0").model_copy(update={"steps": (Step(name="stand"),)})
+    walk = write(tmp_path / "stand.mcap", SMALL, stood)
+    with pytest.raises(BadInputError, match="expected steps that sweep one joint"):
+        compare.rows(fitted(tmp_path, LEGGED, **KNOWN), walk)
+
+
+def test_doctor_without_the_laboratory_says_what_to_install(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("antennate.cli.doctor.installed", lambda group: ())
+    code = main(["doctor", "--no-config", "--compare", "fit.toml", str(tmp_path / "a.mcap")])
+    said = capsys.readouterr().err
+    assert code == 2
+    assert said.count("\n") == 1
+    assert "expected the package antennate-lab" in said
+
+
+PROTOCOL = "carry = 1.5\n" + "".join(
+    f'[[steps]]\nplace = "hanging"\njoint = "{name}"\nlowest = 0.5\nhighest = 8.0\nseconds = 3.0\n'
+    for name in ("yaw1", "leg_l1", "leg_r2", "antenna_l_base")
+)
+HEAD = 'imu = { kind = "head" }\n'
+OF_ANTENNA, BACKLASH = "servos.xl330_m288.gain_divisor", "yaw.backlash[0]"
+
+
+class Twin:
+    """A twin that takes orders from a pipe."""
+
+    def __init__(self, folder: Path, robot: str) -> None:
+        self.folder = folder
+        os.mkfifo(folder / "orders")
+        (folder / "short.toml").write_text(PROTOCOL)
+        (folder / "built.toml").write_text(robot)
+        words = ["--scene", "flat", "--orders", "orders", "--robot-toml", "twin.toml"]
+        self.process = subprocess.Popen(
+            [*ANTENNATE, "twin", "--robot", "built.toml", *words],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            cwd=folder,
+        )
+        assert self.process.stdout is not None
+        assert json.loads(self.process.stdout.readline())
+
+    def order(self, text: str) -> None:
+        (self.folder / "orders").write_text(f"{text}\n")
+        time.sleep(0.5)
+
+    def rows(self, out: str, file: Path) -> dict[str, dict[str, Any]]:
+        """Record the protocol, compare it, and give the doctor's rows by their check."""
+        words = ["--config", "twin.toml", "--dry-run", "1", "--no-touch-check", "--arm"]
+        words += ["--protocol", "short.toml", "--tell", "orders", "--out", out]
+        words += ["--limits.late-answers", "100", "--limits.silent-answers", "100"]
+        drive = [*ANTENNATE, "drive", *words]
+        subprocess.run(drive, cwd=self.folder, check=True, capture_output=True, timeout=120)
+        doctor = [*ANTENNATE, "doctor", "--no-config", "--json", "--compare", str(file), out]
+        done = subprocess.run(doctor, cwd=self.folder, capture_output=True, timeout=400)
+        assert done.returncode == 0, done.stderr.decode()
+        return {row["check"]: row for row in json.loads(done.stdout)["rows"]}
+
+
+@pytest.mark.ci
+def test_twin_with_joints_repaired_wrongly_is_told_from_one_that_nobody_touched(
+    tmp_path: Path,
+) -> None:
+    """The gain of a leg is halved and given back; a yaw joint has 2 degrees of backlash."""
+    known = KNOWN | {OF_ANTENNA: (250.0, 262.0), BACKLASH: (0.0, 0.001)}
+    file = fitted(tmp_path, HEAD, **known)
+    twin = Twin(tmp_path, HEAD + "[yaw]\nbacklash = [0.035, 0.0, 0.0, 0.0, 0.0]\n")
+    try:
+        twin.order("fault servo:8=position_p_gain:350")
+        wrong = twin.rows("wrong", file)
+        assert wrong["leg_l1"]["grade"] == "warn"
+        assert numbers_of(wrong["leg_l1"]["found"])["gain"] == pytest.approx(0.5, abs=0.05)
+        assert wrong["yaw1"]["grade"] == "warn"
+        assert "backlash not as fitted" in wrong["yaw1"]["cure"]
+        assert numbers_of(wrong["yaw1"]["found"])["backlash"] == pytest.approx(2.0, abs=0.4)
+        assert wrong["leg_r2"]["grade"] == wrong["antenna_l_base"]["grade"] == "ok"
+        twin.order("fault servo:8=position_p_gain:700")
+        right = twin.rows("right", file)
+        assert right["leg_l1"]["grade"] == right["leg_r2"]["grade"] == "ok"
+    finally:
+        twin.process.kill()
+        twin.process.communicate()
