@@ -87,6 +87,7 @@ class Script:
         page: The page.
         folder: Where it runs.
         acts: What a person does beside a command, by the command's name.
+        patience: Longest that a block may take [s].
 
     Attributes:
         said: What all commands have said so far, spaces made one.
@@ -94,12 +95,16 @@ class Script:
     """
 
     def __init__(
-        self, page: str, folder: Path, acts: Mapping[str, Callable[[Command, Script], None]]
+        self,
+        page: str,
+        folder: Path,
+        acts: Mapping[str, Callable[[Command, Script], None]],
+        patience: float = _PATIENCE,
     ) -> None:
         self.blocks = blocks(page)
         self.said = ""
         self.twin: OrderedTwin | None = None
-        self._folder, self._acts = folder, acts
+        self._folder, self._acts, self._patience = folder, acts, patience
 
     def run(self) -> None:
         """Go through all blocks."""
@@ -136,7 +141,7 @@ class Script:
             words,
             capture_output=True,
             text=True,
-            timeout=_PATIENCE,
+            timeout=self._patience,
             cwd=self._folder,
             env=os.environ | own,
         )

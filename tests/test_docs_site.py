@@ -57,6 +57,18 @@ def test_the_twin_is_driven(tmp_path: Path) -> None:
         script.run()
 
 
+@pytest.mark.slow
+def test_a_twin_is_recorded_fitted_simulated_and_compared(tmp_path: Path) -> None:
+    """The hour of docs/fit.md, from a twin to its fitted robot, as its commands stand there."""
+    with Script("fit.md", tmp_path, {}, patience=3600.0) as script:
+        script.run()
+    fitted = tomllib.loads((tmp_path / "fit-1" / "robot.toml").read_text())
+    servo = fitted["servos"]["xc430_w240"]
+    built = tomllib.loads((tmp_path / "built.toml").read_text())["servos"]["xc430_w240"]
+    assert servo["gain_divisor"] == pytest.approx(built["gain_divisor"], rel=0.05)
+    assert servo["delay"] == pytest.approx(built["delay"], abs=0.004)
+
+
 @pytest.mark.ci
 def test_the_robot_has_room_at_the_start_of_the_scene_of_the_page(tmp_path: Path) -> None:
     (text,) = (block.text for block in blocks(SCENES) if block.kind == "xml")

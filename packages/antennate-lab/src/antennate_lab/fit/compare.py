@@ -7,7 +7,6 @@ robot's file, wider by what the sweep leaves open and by what joints of one mode
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -19,16 +18,16 @@ from antennate.messages import typed
 from antennate.robots.spec import Fitted, RobotSpec
 from antennate.studies.pool import Workers, core_count, gather
 from antennate.studies.trials import OnStep, no_step
-from antennate_lab.fit import least_squares, measures, recording
+from antennate_lab.fit import least_squares, recording
 from antennate_lab.fit.config import FitConfig
 from antennate_lab.fit.estimates import SHORTEST, Estimate, of_air
 from antennate_lab.fit.parameters import BACKLASH, parameters
 from antennate_lab.fit.residuals import moving
-from antennate_lab.fit.simulated import Course, simulated
+from antennate_lab.fit.simulated import Course
 
 ALIKE = {"lag": 5.0, "gain": 0.15, "friction": 0.02, "backlash": 0.3}
 """Differences that are none, between joints of one model and between two days [ms], [share of the
-fitted gain], [N·m], [deg] (assumed)."""
+fitted gain], [N·m], [deg] (assumed). The lag is the time from a goal to the drive that follows."""
 _UNITS = {"lag": " ms", "gain": "", "friction": " N·m", "backlash": "°"}
 _CAUSES = {
     "lag": "return delay, Profile Velocity and load",
@@ -36,7 +35,8 @@ _CAUSES = {
     "friction": "what rubs: horn, screws, cable",
     "backlash": "the horn, its screws and the gear",
 }
-_OF_SERVO = {"gain": "gain_divisor", "delay": "delay", "friction": "friction"}
+_OF_SERVO = {"lag": "delay", "gain": "gain_divisor", "friction": "friction"}
+_FACTORS = {"lag": 1e3, "friction": 1.0, "backlash": float(np.degrees(1.0))}
 _ROUNDS = 10
 
 
@@ -62,11 +62,11 @@ class Compared:
 
     def expected(self) -> str:
         """The range, in words."""
-        return f"{self.name} {self.low:.3g} to {self.high:.3g}{_UNITS[self.name]}"
+        return f"{self.name} {self.low:.2g} to {self.high:.2g}{_UNITS[self.name]}"
 
     def said(self) -> str:
         """What was found, in words."""
-        what = "not told" if self.found is None else f"{self.found:.3g}{_UNITS[self.name]}"
+        what = "not told" if self.found is None else f"{self.found:.2g}{_UNITS[self.name]}"
         return f"{self.name} {what}"
 
 
@@ -132,55 +132,35 @@ def _joint(robot: RobotSpec, course: Course) -> list[Compared]:
     place = int(moving(course)[0])
     servo, name = robot.servo_names[place], robot.joint_names[place]
     known = {each.name: each for each in robot.fitted}
-    paths = {kind: f"servos.{servo}.{key}" for kind, key in _OF_SERVO.items()}
-    free: list[tuple[str, int | None]] = [(paths["gain"], None), (paths["delay"], None)]
-    free += [(paths["friction"], None)] if paths["friction"] in known else []
+    free: dict[str, tuple[str, int | None]] = {
+        kind: (f"servos.{servo}.{path}", None) for kind, path in _OF_SERVO.items()
+    }
+    if free["friction"][0] not in known:
+        free.pop("friction")
     if name in robot.yaw_names and course.gyro.size:
-        free.append((BACKLASH, robot.yaw_names.index(name)))
-    problem = least_squares.Problem(robot, [course], parameters(robot, free), Workers(1))
+        free["backlash"] = (BACKLASH, robot.yaw_names.index(name))
+    problem = least_squares.Problem(robot, [course], parameters(robot, free.values()), Workers(1))
     solution = least_squares.solve(problem, problem.start, _ROUNDS)
     errors = least_squares.covariances(problem, solution, np.random.default_rng(0))
-    estimates = {each.parameter.path: each for each in of_air(problem, solution, *errors)}
-    lag = _lag(robot, course, known.get(paths["gain"]), known.get(paths["delay"]))
-    return [lag, *_compared(estimates, known, paths)]
+    found = zip(free, of_air(problem, solution, *errors), strict=True)
+    beside = [_compared(kind, each, known.get(each.parameter.name)) for kind, each in found]
+    return [each for each in beside if each is not None]
 
 
-def _lag(robot: RobotSpec, course: Course, gain: Fitted | None, delay: Fitted | None) -> Compared:
-    """The time by which a joint is late: what the drive takes goes with 1 / gain, then a delay."""
-    measured, fitted = (
-        float(measures.lags(each)[0]) for each in (course, simulated(robot, course))
-    )
-    servo = robot.servos.of(robot.servo_names[int(moving(course)[0])])
-    drive = fitted - servo.delay
-    late = (0.0, SHORTEST) if delay is None else (delay.low - servo.delay, delay.high - servo.delay)
-    ends = (
-        (1.0, 1.0)
-        if gain is None
-        else tuple(end / servo.gain_divisor for end in (gain.low, gain.high))
-    )
-    low, high = (
-        1e3 * (fitted + drive * (share - 1.0) + more)
-        for share, more in zip(ends, late, strict=True)
-    )
-    return Compared("lag", low - ALIKE["lag"], high + ALIKE["lag"], 1e3 * measured)
+def _compared(kind: str, each: Estimate, fitted: Fitted | None) -> Compared | None:
+    """An estimate beside the interval of the file; None where it has none.
 
-
-def _compared(
-    estimates: dict[str, Estimate], known: dict[str, Fitted], paths: dict[str, str]
-) -> Iterator[Compared]:
-    """Estimates of a joint beside the intervals of the file, where it has one."""
-    for path, each in estimates.items():
-        fitted = known.get(each.parameter.name)
-        kind = "backlash" if path == BACKLASH else next(k for k, p in paths.items() if p == path)
-        if fitted is None or kind not in ALIKE:
-            continue
-        start = each.parameter.start
-        if kind == "gain":
-            numbers = [start / x for x in (fitted.low, fitted.high, *each.interval, each.value)]
-        else:
-            factor = float(np.degrees(1.0)) if kind == "backlash" else 1.0
-            numbers = [factor * x for x in (fitted.low, fitted.high, *each.interval, each.value)]
-        ends, own, found = sorted(numbers[:2]), abs(numbers[3] - numbers[2]) / 2, numbers[4]
-        wider = ALIKE[kind] + own
-        low, high = max(ends[0] - wider, 0.0), ends[1] + wider
-        yield Compared(kind, low, high, found if each.told else None)
+    A delay that no log told is the one of the file, within a timestep.
+    """
+    start = each.parameter.start
+    if fitted is None and kind == "lag":
+        fitted = Fitted(low=start, high=start + SHORTEST)
+    if fitted is None:
+        return None
+    shown = [
+        start / x if kind == "gain" else _FACTORS[kind] * x
+        for x in (fitted.low, fitted.high, *each.interval, each.value)
+    ]
+    wider = ALIKE[kind] + abs(shown[3] - shown[2]) / 2
+    low, high = sorted(shown[:2])
+    return Compared(kind, max(low - wider, 0.0), high + wider, shown[4] if each.told else None)
