@@ -18,7 +18,6 @@ from antennate.cli import main
 from antennate.cli.doctor import VIEW
 from antennate.control.protocol import Step
 from antennate.errors import BadInputError
-from antennate.hardware.doctor.check import Row
 from antennate.robots.spec import RobotSpec
 from antennate.types import Floats
 from antennate_lab.fit import compare
@@ -46,7 +45,7 @@ KNOWN = {GAIN: (126.0, 130.0), FRICTION: (0.0, 0.002)}
 """Intervals about the numbers of a new robot."""
 
 
-def compared(folder: Path, **numbers: float) -> Row:
+def compared(folder: Path, **numbers: float) -> compare.Row:
     """The row of the one joint of a log, its servo with other numbers than the file says."""
     servos = {"xc430_w240": SMALL.servos.xc430_w240.model_dump() | numbers}
     truth = RobotSpec.model_validate(SMALL.model_dump() | {"servos": servos})

@@ -9,11 +9,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 
 from antennate.errors import BadInputError
-from antennate.hardware.doctor.check import Row
 from antennate.messages import typed
 from antennate.robots.spec import Fitted, RobotSpec
 from antennate.studies.pool import Workers, core_count, gather
@@ -68,6 +68,23 @@ class Compared:
         """What was found, in words."""
         what = "not told" if self.found is None else f"{self.found:.2g}{_UNITS[self.name]}"
         return f"{self.name} {what}"
+
+
+@dataclass(frozen=True)
+class Row:
+    """A row of the doctor's table: `antennate.hardware.doctor.check.Row` has the same fields.
+
+    Attributes:
+        part: "log" or "joint".
+        grade: "ok"; "note", a number is not told; "warn", it is not as fitted.
+    """
+
+    part: str
+    check: str
+    expected: str
+    found: str
+    grade: Literal["ok", "note", "warn"]
+    cure: str
 
 
 def rows(file: Path, log: Path, on_step: OnStep = no_step) -> list[Row]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import nullcontext
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -134,9 +135,9 @@ def _compared(file: Path, log: Path) -> list[Row]:
             "--compare: expected the package antennate-lab, which has fit, found none; install it "
             f"with {INSTALLATION}"
         )
-    rows: Callable[..., list[Row]] = points[0].load()
+    rows: Callable[..., list[Any]] = points[0].load()
     with stop_signals(), progress("joints") as step:
-        return rows(file, log, step)
+        return [Row(**asdict(row)) for row in rows(file, log, step)]
 
 
 def _fix(
