@@ -18,6 +18,7 @@ from antennate.control.climbing.rule import Stage
 from antennate.control.registry import make_controller
 from antennate.params.base import Params
 from antennate.params.control import ControlParams
+from antennate.robots.servos import ServosParams
 from antennate.robots.spec import RobotSpec
 from antennate.types import AntennaFrame, Controller
 
@@ -63,6 +64,12 @@ def leaves(model: type[Params], path: tuple[str, ...] = ()) -> Iterator[str]:
             yield from leaves(kind, (*path, name))
         else:
             yield ".".join((*path, name))
+
+
+def tried(paths: set[str]) -> set[str]:
+    """Those of them that a few runs can show: of the servo models the first three stand for all."""
+    later = tuple(ServosParams.model_fields)[3:]
+    return {path for path in paths if not any(f"servos.{name}." in path for name in later)}
 
 
 def robot_for(name: str) -> RobotSpec:

@@ -23,6 +23,7 @@ from antennate.robots.spec import ROBOTS, RobotSpec
 from antennate.sim.world import PREFIX, World, compile_world
 from antennate.studies.formats import to_toml
 from antennate.testing import check_robot
+from dynamixel_bus.models import MODELS
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
 
@@ -126,7 +127,14 @@ BAD = [
     ("links = 1", "links: expected a number of at least 2, found 1"),
     ("links = 'six'", "links: expected a whole number, found 'six'"),
     ("lynks = 8", "lynks: expected a known key (did you mean links?)"),
-    ("[yaw]\nservo = 'ax12'", "yaw.servo: expected one of xc430_w240, xl330_m288 or xl430_w250"),
+    (
+        "[yaw]\nservo = 'ax12'",
+        "yaw.servo: expected one of xc430_w240, xl330_m288, xl430_w250, xl330_m077, ",
+    ),
+    (
+        "[yaw]\nservo = 'xl320'",
+        "yaw.servo: expected a servo of the X series, found xl320: the XL-320 has another control",
+    ),
     ("[antennae]\nfastest = 11.0", "antennae.fastest"),
     ("links =", "expected TOML"),
 ]
@@ -143,6 +151,27 @@ def test_a_bad_robot_file_is_refused_in_one_line(
     told = capsys.readouterr().err
     assert f"{file}: {said}" in told
     assert told.count("\n") == 1
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_a_joint_has_any_model_that_the_bus_speaks_with(name: str) -> None:
+    """With the numbers of its file, which a run writes down too; another's are written changed."""
+    key = name.replace("-", "_")
+    robot = RobotSpec.model_validate({"antennae": {"servo": key, "fastest": 1.0}})
+    servo = robot.servo_of(robot.antennae)
+    rating = MODELS[name].rating
+    assert (servo.product, servo.model_number) == (MODELS[name].name, MODELS[name].number)
+    assert (servo.stall_torque, servo.no_load_speed) == (rating.stall_torque, rating.no_load_speed)
+    assert (servo.gain_divisor, servo.armature) == (rating.gain_divisor, rating.armature)
+    assert servo.p_gain == MODELS[name]["position_p_gain"].default
+    written = robot.model_dump()["servos"]
+    assert set(written) == {"xc430_w240", "xl330_m288", "xl430_w250", key}
+    slow = {"xm540_w270": {"friction": 0.2}}
+    changed = RobotSpec.model_validate({"servos": slow})
+    again = RobotSpec.model_validate(changed.model_dump())
+    assert again == changed
+    assert again.servos.xm540_w270.friction == 0.2
+    assert again.servos.xm540_w270.stall_torque == 10.0  # its datasheet at 11.1 V
 
 
 def test_a_configuration_names_its_robot_and_changes_it(tmp_path: Path) -> None:

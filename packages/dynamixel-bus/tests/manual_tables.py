@@ -1,6 +1,8 @@
-"""The control tables of three models, copied number by number from the pages of the manual.
+"""The control tables of twelve models, copied number by number from the pages of the manual.
 
-Sources: https://emanual.robotis.com/docs/en/dxl/x/xc430-w240/, .../xl430-w250/ and .../xl330-m288/.
+Sources: https://emanual.robotis.com/docs/en/dxl/x/xc430-w240/, and so on by their names. An XM430
+has the voltage limits of the page of the XM430-W210; Drive Mode, Startup Configuration and Backup
+Ready of an XM430 and XM540 are those of the newest page, that of the XM540-W150.
 Columns: address, size, name, access, initial value, smallest and largest value that may be written;
 "-" where the page says nothing. A value "~NAME" is bounded by that register, "?" by its own rule.
 Signed registers are marked by "s" after the size.
@@ -90,6 +92,68 @@ _XL330 = """
 """
 
 
+_M077 = """
+44   4  velocity_limit         RW  1620  0        2047
+76   2  velocity_i_gain        RW  400   0        16383
+78   2  velocity_p_gain        RW  40    0        16383
+82   2  position_i_gain        RW  400   0        16383
+"""
+_XC330_M288 = """
+10   1  drive_mode             RW  0     0        13
+38   2  current_limit          RW  2352  0        2352
+44   4  velocity_limit         RW  350   0        2047
+63   1  shutdown               RW  52    -        -
+78   2  velocity_p_gain        RW  50    0        16383
+80   2  position_d_gain        RW  500   0        16383
+84   2  position_p_gain        RW  1100  0        16383
+"""
+_XC330_M181 = """
+44   4  velocity_limit         RW  545   0        2047
+76   2  velocity_i_gain        RW  1400  0        16383
+78   2  velocity_p_gain        RW  100   0        16383
+84   2  position_p_gain        RW  1200  0        16383
+"""
+_XC330_T288 = """
+32   2  max_voltage_limit      RW  140   55       140
+34   2  min_voltage_limit      RW  55    55       140
+38   2  current_limit          RW  910   0        910
+44   4  velocity_limit         RW  320   0        2047
+62   1  pwm_slope              RW  255   1        255
+76   2  velocity_i_gain        RW  1200  0        16383
+78   2  velocity_p_gain        RW  40    0        16383
+80   2  position_d_gain        RW  0     0        16383
+84   2  position_p_gain        RW  900   0        16383
+"""
+_XC330_T181 = """
+44   4  velocity_limit         RW  510   0        2047
+"""
+_XM430_W350 = """
+32   2  max_voltage_limit      RW  160   95       160
+34   2  min_voltage_limit      RW  95    95       160
+38   2  current_limit          RW  1193  0        1193
+44   4  velocity_limit         RW  200   0        1023
+84   2  position_p_gain        RW  800   0        16383
+102  2s goal_current           RW  -     ~current_limit ~
+126  2s present_current        R   -     -        -
+"""
+_XM430_W210 = """
+44   4  velocity_limit         RW  330   0        1023
+"""
+_XM540_W270 = """
+38   2  current_limit          RW  2047  0        2047
+44   4  velocity_limit         RW  128   0        1023
+56   1  external_port_mode_1   RW  3     0        3
+57   1  external_port_mode_2   RW  3     0        3
+58   1  external_port_mode_3   RW  3     0        3
+152  2  external_port_data_1   RW  -     -        -
+154  2  external_port_data_2   RW  -     -        -
+156  2  external_port_data_3   RW  -     -        -
+"""
+_XM540_W150 = """
+44   4  velocity_limit         RW  230   0        1023
+"""
+
+
 class Row(NamedTuple):
     """One line of the manual."""
 
@@ -154,9 +218,53 @@ PAGES = [
         _rows(_COMMON, 1200) | _rows(_XL330, 1200) | _SHORT,
     ),
 ]
+"""Those whose effects are tried one by one, in tests/test_control_effects.py."""
+_SIX = {0, 1, 3, 4, 5, 16}
+
+
+def _small(name: str, model: int, *tables: str) -> Page:
+    """The page of a servo of the size 330."""
+    rows = [_rows(table, model) for table in (_COMMON, _XL330, *tables)]
+    return Page(name, model, _SIX, {k: v for table in (*rows, _SHORT) for k, v in table.items()})
+
+
+def _large(name: str, model: int, *tables: str) -> Page:
+    """The page of a servo of the size 430 or 540 that measures its current."""
+    rows = [_rows(table, model) for table in (_COMMON, _XM430_W350, *tables)]
+    return Page(name, model, _SIX, {k: v for table in (*rows, _LONG) for k, v in table.items()})
+
+
+ALL_PAGES = [
+    *PAGES,
+    _small("XL330-M077-T", 1190, _M077),
+    _small("XC330-M288-T", 1240, _XC330_M288),
+    _small("XC330-M181-T", 1230, _XC330_M288, _XC330_M181),
+    _small("XC330-T288-T", 1220, _XC330_M288, _XC330_T288),
+    _small("XC330-T181-T", 1210, _XC330_M288, _XC330_T288, _XC330_T181),
+    _large("XM430-W350-T", 1020),
+    _large("XM430-W210-T", 1030, _XM430_W210),
+    _large("XM540-W270-T", 1120, _XM540_W270),
+    _large("XM540-W150-T", 1130, _XM540_W270, _XM540_W150),
+]
+SIZE_330 = {1190, 1200, 1210, 1220, 1230, 1240}
+"""Models whose pages allow Protocol Type 2 and 20 to 22."""
+RATINGS = {
+    1080: (11.1, 1.7, 65.0, 1.3),
+    1060: (11.1, 1.4, 57.0, 1.3),
+    1200: (5.0, 0.52, 103.0, 1.47),
+    1190: (5.0, 0.215, 383.0, 1.47),
+    1240: (5.0, 0.93, 81.0, 1.80),
+    1230: (5.0, 0.60, 129.0, 1.80),
+    1220: (11.1, 0.92, 65.0, 0.80),
+    1210: (11.1, 0.76, 104.0, 0.80),
+    1020: (11.1, 3.8, 43.0, 2.1),
+    1030: (11.1, 2.7, 70.0, 2.1),
+    1120: (11.1, 10.0, 28.0, 4.2),
+    1130: (11.1, 6.9, 50.0, 4.2),
+}
+"""Supply [V], stall torque [N·m], no-load speed [rev/min] and stall current [A], from section
+Specifications."""
 BAUD_RATES = [9_600, 57_600, 115_200, 1_000_000, 2_000_000, 3_000_000, 4_000_000, 4_500_000]
 """Of the register Baud Rate; the XL330's page stops at 4 Mbps."""
-STALL_CURRENT = {1080: 1.3, 1060: 1.3, 1200: 1.47}
-"""At the recommended supply [A], from section Specifications."""
-NO_LOAD_SPEED = {1080: 65.0, 1060: 57.0, 1200: 103.0}
-"""At the recommended supply [rev/min], likewise."""
+STALL_CURRENT = {model: amperes for model, (_, _, _, amperes) in RATINGS.items()}
+NO_LOAD_SPEED = {model: speed for model, (_, _, speed, _) in RATINGS.items()}

@@ -1,4 +1,4 @@
-"""Every register of three models in bytes: address, size, access, initial value and range.
+"""Every register of twelve models in bytes: address, size, access, initial value and range.
 
 The expected values are those of the manual's pages, copied in `manual_tables.py`. What a register
 does is in `test_control_effects.py`.
@@ -6,10 +6,11 @@ does is in `test_control_effects.py`.
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import pytest
-from manual_tables import PAGES, Page, Row
+from manual_tables import ALL_PAGES, RATINGS, SIZE_330, Page, Row
 from servo_bench import ACCESS, LENGTH, LIMIT, NONE, RANGE, Bench
 
 from dynamixel_bus.models import MODELS_BY_NUMBER
@@ -22,7 +23,7 @@ def write(page: Page, row: Row, value: int, size: int | None = None) -> int:
     return said.error
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+@pytest.mark.parametrize("page", ALL_PAGES, ids=lambda page: page.name)
 def test_our_table_has_the_registers_of_the_manual_and_no_others(page: Page) -> None:
     table = MODELS_BY_NUMBER[page.model]
     assert table.name == page.name
@@ -32,7 +33,7 @@ def test_our_table_has_the_registers_of_the_manual_and_no_others(page: Page) -> 
     assert ours == theirs
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+@pytest.mark.parametrize("page", ALL_PAGES, ids=lambda page: page.name)
 def test_a_register_can_be_read_at_its_address_and_has_its_initial_value(page: Page) -> None:
     bench = Bench(page)
     for row in page.rows.values():
@@ -40,7 +41,7 @@ def test_a_register_can_be_read_at_its_address_and_has_its_initial_value(page: P
             assert bench.get(row.name) == row.initial, row.name
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+@pytest.mark.parametrize("page", ALL_PAGES, ids=lambda page: page.name)
 def test_what_the_page_does_not_list_cannot_be_read(page: Page) -> None:
     listed = {a for row in page.rows.values() for a in range(row.address, row.address + row.size)}
     bench = Bench(page)
@@ -49,7 +50,7 @@ def test_what_the_page_does_not_list_cannot_be_read(page: Page) -> None:
         assert (error, len(data)) == ((NONE, 1) if address in listed else (ACCESS, 0)), address
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+@pytest.mark.parametrize("page", ALL_PAGES, ids=lambda page: page.name)
 def test_what_can_only_be_read_is_not_written_and_half_of_a_register_neither(page: Page) -> None:
     for row in page.rows.values():
         if not row.writable:
@@ -81,7 +82,7 @@ def bounds(page: Page, row: Row) -> dict[int, int]:
     return found
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+@pytest.mark.parametrize("page", ALL_PAGES, ids=lambda page: page.name)
 def test_the_ends_of_its_range_can_be_written_and_nothing_beyond(page: Page) -> None:
     known = 0
     for row in page.rows.values():
@@ -91,30 +92,30 @@ def test_the_ends_of_its_range_can_be_written_and_nothing_beyond(page: Page) -> 
     assert known > 50
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+@pytest.mark.parametrize("page", ALL_PAGES, ids=lambda page: page.name)
 def test_a_mode_that_the_model_lacks_is_refused(page: Page) -> None:
     row = page.row("operating_mode")
     for mode in range(256):
         assert write(page, row, mode) == (NONE if mode in page.modes else RANGE), mode
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+@pytest.mark.parametrize("page", ALL_PAGES, ids=lambda page: page.name)
 def test_bits_of_drive_mode_that_are_unused_stay_0(page: Page) -> None:
     row = page.row("drive_mode")
-    used = {0, 1, 4, 5} if page.model == 1200 else {0, 1, 4, 5, 8, 9, 12, 13}
+    used = {0, 1, 4, 5} if page.name.startswith("XL330") else {0, 1, 4, 5, 8, 9, 12, 13}
     for bits in range(16):
         assert write(page, row, bits) == (NONE if bits in used else RANGE), bits
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+@pytest.mark.parametrize("page", ALL_PAGES, ids=lambda page: page.name)
 def test_protocols_that_the_page_lists_are_taken(page: Page) -> None:
     row = page.row("protocol_type")
-    known = {2, 20, 21, 22} if page.model == 1200 else {1, 2}
+    known = {2, 20, 21, 22} if page.model in SIZE_330 else {1, 2}
     for kind in range(30):
         assert write(page, row, kind) == (NONE if kind in known else RANGE), kind
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+@pytest.mark.parametrize("page", ALL_PAGES, ids=lambda page: page.name)
 def test_torque_locks_the_eeprom_and_nothing_else(page: Page) -> None:
     for row in page.rows.values():
         if not row.writable or row.name == "torque_enable":
@@ -125,7 +126,7 @@ def test_torque_locks_the_eeprom_and_nothing_else(page: Page) -> None:
         assert bench.put(row.name, value) == (ACCESS if row.address < 64 else NONE), row.name
 
 
-MODEL_FILES = {1080: "xc430_w240", 1060: "xl430_w250", 1200: "xl330_m288"}
+MODEL_FILES = {page.model: page.name[:-2].lower().replace("-", "_") for page in ALL_PAGES}
 """Files of the official SDK by model number."""
 NOT_IN_FILES = {"startup_configuration", "backup_ready"}
 """Registers of the manual that no file of the SDK has."""
@@ -146,7 +147,7 @@ def rows_of_the_sdk(model: int, firmware: int) -> dict[int, tuple[int, str]]:
         for path in (Path(easy.__file__).parent / "control_table").glob(f"{name}*.model")
         if path.stem.partition("_fw")[0] == name
     }
-    if model == 1200 and 52 not in files:
+    if model in SIZE_330 and 52 not in files:
         pytest.skip("this release of the SDK has no table for firmware 52")
     lines = files[max(v for v in files if v <= firmware)].read_text().partition("[control table]")
     rows = (line.split("\t") for line in lines[2].split("\n")[2:] if line.strip())
@@ -160,7 +161,7 @@ def plain(title: str) -> str:
     return OTHER_NAMES.get(name, name)
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+@pytest.mark.parametrize("page", ALL_PAGES, ids=lambda page: page.name)
 def test_the_table_is_that_of_the_official_sdk_for_the_firmware_that_a_servo_says(
     page: Page,
 ) -> None:
@@ -184,3 +185,15 @@ def test_the_table_is_that_of_the_official_sdk_for_the_firmware_that_a_servo_say
         assert said.error == NONE
     (said,) = bench.ask(2, places["Indirect Data Read"].to_bytes(2, "little") + bytes([4, 0]))
     assert (said.error, int.from_bytes(said.data, "little")) == (NONE, 2048)
+
+
+@pytest.mark.parametrize("page", ALL_PAGES, ids=lambda page: page.name)
+def test_a_rating_is_that_of_the_specifications(page: Page) -> None:
+    rating = MODELS_BY_NUMBER[page.model].rating
+    speed = rating.no_load_speed * 60.0 / (2.0 * math.pi)
+    found = (rating.voltage, rating.stall_torque, speed, rating.stall_current)
+    assert found == pytest.approx(RATINGS[page.model])
+
+
+def test_each_model_of_the_package_has_a_page_here() -> None:
+    assert set(MODELS_BY_NUMBER) == {page.model for page in ALL_PAGES}

@@ -81,7 +81,7 @@ def test_each_number_of_a_rating_has_a_source(name: str) -> None:
 
 
 WRONG = [
-    ('like = "xc430-w240"', 'like = "xm430"', "like: expected one of xc430-w240, xl330-m288"),
+    ('like = "xc430-w240"', 'like = "xm430"', "like: expected one of xc330-m181, xc330-m288"),
     ('like = "xc430-w240"', 'like = "xm430-w210.toml"', "found one like itself"),
     ('like = "xc430-w240"', "", "expected the key firmware"),
     ("number = 1030", "numbers = 1030", "unknown key 'numbers' (did you mean number?)"),
@@ -157,3 +157,17 @@ def test_models_are_read_from_a_zip(tmp_path: Path) -> None:
     where, *numbers = ran.stdout.split()
     assert "program.zip" in where
     assert numbers == ["1200", "1030"]
+
+
+@pytest.mark.parametrize("name", ["xl320", "XL-320"])
+def test_the_xl320_is_refused_with_the_reason(name: str) -> None:
+    """It speaks Protocol 2.0, and its Goal Position lies at 30 (its manual), not at 116."""
+    with pytest.raises(ConfigError, match=f"found {name}: .*goal position at 30, not 116"):
+        servo_model(name)
+
+
+def test_the_command_refuses_the_xl320_in_one_line(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["1:xl320"]) == 2
+    out, err = capsys.readouterr()
+    assert (out, err.count("\n")) == ("", 1)
+    assert "found xl320: the XL-320 has another control table" in err

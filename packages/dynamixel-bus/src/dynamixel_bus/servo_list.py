@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from dynamixel_bus.errors import ConfigError
 from dynamixel_bus.model import BAUD_RATES
-from dynamixel_bus.models import MODELS, servo_model
+from dynamixel_bus.models import MODELS, not_served, servo_model
 from dynamixel_bus.packets import LAST_ID
 from dynamixel_bus.servo import Servo
 
@@ -75,6 +75,10 @@ def make_servo(listed: ListedServo, position: float = MIDDLE, flag: str = "") ->
     if listed.id > LAST_ID:
         raise ConfigError(f"{flag}expected an id from 0 to {LAST_ID}, found {listed.id}")
     if not listed.model.endswith(".toml"):
+        if why := not_served(listed.model):
+            raise ConfigError(
+                f"{flag}expected a servo of the X series, found {listed.model}: {why}"
+            )
         _require(listed.model, MODELS, f"{flag}expected as model")
     model = servo_model(listed.model)
     speeds = BAUD_RATES[: (model["baud_rate"].high or 0) + 1]

@@ -15,16 +15,48 @@ u and τ are 0. `replay` takes goals as they arrive, so without the delay.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
+from pydantic import (
+    BeforeValidator,
+    SerializerFunctionWrapHandler,
+    create_model,
+    model_serializer,
+)
 
 from antennate.params.base import Params, number
 from antennate.types import Bools, Floats
 from dynamixel_bus.model import ServoModel, position_gain
-from dynamixel_bus.models import XC430_W240, XL330_M288, XL430_W250
+from dynamixel_bus.models import MODELS, XC430_W240, XL330_M288, XL430_W250, not_served
 
-ServoName = Literal["xc430_w240", "xl330_m288", "xl430_w250"]
+
+def _served(name: Any) -> Any:
+    """The name, unless it is of a servo that the bus does not speak with."""
+    if why := not_served(str(name)):
+        raise ValueError(f"expected a servo of the X series, found {name}: {why}")
+    return name
+
+
+ServoName = Annotated[
+    Literal[
+        "xc430_w240",
+        "xl330_m288",
+        "xl430_w250",
+        "xl330_m077",
+        "xc330_m181",
+        "xc330_m288",
+        "xc330_t181",
+        "xc330_t288",
+        "xm430_w210",
+        "xm430_w350",
+        "xm540_w150",
+        "xm540_w270",
+    ],
+    BeforeValidator(_served),
+]
+_ALWAYS_WRITTEN = 3
+"""Models that stand in every file of a run, used or not: the first ones."""
 
 
 _NUMBERS: dict[str, tuple[str, dict[str, Any]]] = {
@@ -127,28 +159,57 @@ class ServoParams(Params):
         return self.stall_torque / self.no_load_speed
 
 
-class XL330Params(ServoParams):
+def _numbers_of(model: ServoModel) -> type[ServoParams]:
+    """Parameters of a servo with the numbers of another model."""
+    rated = {name: (float, _rated(model, name)) for name in MODEL_NUMBERS}
+    fields: dict[str, Any] = rated | {"p_gain": (float, _gain(model))}
+    kind = create_model(model.name, __base__=ServoParams, __module__=__name__, **fields)
+    kind.servo = model
+    return kind
+
+
+class XL330Params(_numbers_of(XL330_M288)):
     """DYNAMIXEL XL330-M288-T at 5 V."""
 
-    servo: ClassVar[ServoModel] = XL330_M288
 
-    stall_torque: float = _rated(XL330_M288, "stall_torque")
-    no_load_speed: float = _rated(XL330_M288, "no_load_speed")
-    p_gain: float = _gain(XL330_M288)
-    gain_divisor: float = _rated(XL330_M288, "gain_divisor")
-    armature: float = _rated(XL330_M288, "armature")
-    friction: float = _rated(XL330_M288, "friction")
-    load_friction: float = _rated(XL330_M288, "load_friction")
+class XL330M077Params(_numbers_of(MODELS["xl330-m077"])):
+    """DYNAMIXEL XL330-M077-T at 5 V."""
 
 
-class XL430Params(ServoParams):
+class XC330M181Params(_numbers_of(MODELS["xc330-m181"])):
+    """DYNAMIXEL XC330-M181-T at 5 V."""
+
+
+class XC330M288Params(_numbers_of(MODELS["xc330-m288"])):
+    """DYNAMIXEL XC330-M288-T at 5 V."""
+
+
+class XC330T181Params(_numbers_of(MODELS["xc330-t181"])):
+    """DYNAMIXEL XC330-T181-T at 11.1 V."""
+
+
+class XC330T288Params(_numbers_of(MODELS["xc330-t288"])):
+    """DYNAMIXEL XC330-T288-T at 11.1 V."""
+
+
+class XL430Params(_numbers_of(XL430_W250)):
     """DYNAMIXEL XL430-W250-T at 11.1 V."""
 
-    servo: ClassVar[ServoModel] = XL430_W250
 
-    stall_torque: float = _rated(XL430_W250, "stall_torque")
-    no_load_speed: float = _rated(XL430_W250, "no_load_speed")
-    p_gain: float = _gain(XL430_W250)
+class XM430W210Params(_numbers_of(MODELS["xm430-w210"])):
+    """DYNAMIXEL XM430-W210-T at 11.1 V."""
+
+
+class XM430W350Params(_numbers_of(MODELS["xm430-w350"])):
+    """DYNAMIXEL XM430-W350-T at 11.1 V."""
+
+
+class XM540W150Params(_numbers_of(MODELS["xm540-w150"])):
+    """DYNAMIXEL XM540-W150-T at 11.1 V."""
+
+
+class XM540W270Params(_numbers_of(MODELS["xm540-w270"])):
+    """DYNAMIXEL XM540-W270-T at 11.1 V."""
 
 
 class ServosParams(Params):
@@ -157,10 +218,28 @@ class ServosParams(Params):
     xc430_w240: ServoParams = ServoParams()
     xl330_m288: XL330Params = XL330Params()
     xl430_w250: XL430Params = XL430Params()
+    xl330_m077: XL330M077Params = XL330M077Params()
+    xc330_m181: XC330M181Params = XC330M181Params()
+    xc330_m288: XC330M288Params = XC330M288Params()
+    xc330_t181: XC330T181Params = XC330T181Params()
+    xc330_t288: XC330T288Params = XC330T288Params()
+    xm430_w210: XM430W210Params = XM430W210Params()
+    xm430_w350: XM430W350Params = XM430W350Params()
+    xm540_w150: XM540W150Params = XM540W150Params()
+    xm540_w270: XM540W270Params = XM540W270Params()
 
     def of(self, name: ServoName) -> ServoParams:
         """The model of a name."""
         return getattr(self, name)
+
+    @model_serializer(mode="wrap")
+    def _as_before(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Models that came later are written where their numbers were changed."""
+        table = handler(self)
+        for name, field in list(type(self).model_fields.items())[_ALWAYS_WRITTEN:]:
+            if getattr(self, name) == field.default:
+                table.pop(name, None)
+        return table
 
 
 STEP = 0.002

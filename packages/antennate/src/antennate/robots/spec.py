@@ -156,6 +156,10 @@ class RobotSpec(Params):
     def _without_what_is_absent(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
         """A robot without inertial sensor or fitted numbers is written as before there were any."""
         table = handler(self)
+        if isinstance(servos := table.get("servos"), dict):
+            table["servos"] = servos | {
+                name: self.servos.of(name).model_dump() for name in dict.fromkeys(self.servo_names)
+            }
         if self.imu == ImuParams():
             table.pop("imu", None)
         if not self.fitted:

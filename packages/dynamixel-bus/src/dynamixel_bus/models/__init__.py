@@ -21,6 +21,14 @@ _FOLDER = Path(__file__).parent
 _SHIPPED = sorted(file.name[:-5] for file in files(__name__).iterdir() if ".toml" in file.name)
 _LARGEST_FILE = 200_000
 """Most bytes of a model file."""
+_NOT_SERVED = {
+    "xl320": "the XL-320 has another control table than the X series (goal position at 30, not 116;"
+    " 1024 steps over 300 deg, no turn without end, no bus watchdog)"
+}
+"""Servos that one could take for ones of the X series, and why they are none.
+
+Source: https://emanual.robotis.com/docs/en/dxl/x/xl320/.
+"""
 
 
 def servo_model(name: str | Path) -> ServoModel:
@@ -35,11 +43,18 @@ def servo_model(name: str | Path) -> ServoModel:
     if str(name).endswith(".toml"):
         return _read(Path(name))
     if str(name) not in MODELS:
+        if why := not_served(str(name)):
+            raise ConfigError(f"expected a servo of the X series, found {name}: {why}")
         raise ConfigError(
             f"expected as servo model one of {', '.join(MODELS)}, or a file that ends in .toml, "
             f"found {name}{nearest(str(name), MODELS)}"
         )
     return MODELS[str(name)]
+
+
+def not_served(name: str) -> str:
+    """Why a servo is not served although it speaks Protocol 2.0; nothing of any other name."""
+    return _NOT_SERVED.get("".join(c for c in name.lower() if c.isalnum())[:5], "")
 
 
 def model_name(number: int | None) -> str:
