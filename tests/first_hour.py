@@ -65,11 +65,13 @@ class Command:
     """A command with scripted standard input.
 
     Attributes:
+        words: Its words behind `antennate`.
         text: All that it said on stderr.
         output: All that it wrote on stdout; once it has ended.
     """
 
     def __init__(self, words: Sequence[str], folder: Path) -> None:
+        self.words = list(words)
         self._process = start(words, folder)
         self.text = self.output = ""
         self._read = 0

@@ -138,7 +138,7 @@ CASES: list[Case] = [
         "chain: expected a Chain, found 3",
     ),
     (antennate.Chain.of, {"antenna": 3}, "antenna: expected an AntennaSpec, found 3"),
-    (RobotSpec, {"links": 0}, "^links: expected a number of at least 2, found 0$"),
+    (RobotSpec, {"links": 0}, "^links: expected a number of at least 1, found 0$"),
     (RobotSpec, {"links": "many"}, "links: expected a whole number, found 'many'"),
     (RobotSpec, {"mass": NAN}, "mass: expected a finite number, found nan"),
     (RobotSpec, {"mass": 0.31}, "mass must leave more than 10 g a link"),

@@ -11,7 +11,7 @@ import pytest
 from beams import uniform_beam
 
 from antennate.antenna import sensor
-from antennate.antenna.statics import Chain, equilibrium, shape, with_profile
+from antennate.antenna.statics import Chain, equilibrium, largest_force, shape, with_profile
 from antennate.cli import main
 from antennate.errors import SimulationError
 from antennate.experiments import bench
@@ -39,7 +39,7 @@ DATA = Path(__file__).parents[2] / "shared" / "data" / "whisker_force_location_r
 def _loads(config: loads.ForceConfig, profile: str, friction: float) -> tuple[loads.Points, int]:
     """Static loads up to the largest force of a profile."""
     chain = Chain.of(with_profile(config.antenna, profile))
-    largest = loads.largest_force(chain, math.radians(config.hinge_limit_deg))
+    largest = largest_force(chain, math.radians(config.hinge_limit_deg))
     return loads.static_loads(config, profile, friction, largest)
 
 
@@ -47,12 +47,12 @@ def test_largest_force_of_a_small_limit_is_that_of_the_base_hinge():
     """The tip load bends the base hinge most: k q = F L while angles are small."""
     chain = Chain.of(with_profile(BARE, "stiff"))
     wanted = chain.stiffness[0] * 1e-3 / chain.length
-    assert loads.largest_force(chain, 1e-3) == pytest.approx(wanted, rel=1e-3)
+    assert largest_force(chain, 1e-3) == pytest.approx(wanted, rel=1e-3)
 
 
 def test_largest_force_turns_the_most_bent_hinge_by_the_limit():
     chain, limit = Chain.of(AntennaSpec()), math.radians(30)
-    largest = loads.largest_force(chain, limit)
+    largest = largest_force(chain, limit)
     rest = equilibrium(chain, np.array([chain.length]), np.array([[0.0, largest]]), follower=True)
     assert abs(rest.angles).max() == pytest.approx(limit, rel=1e-6)
 
@@ -75,7 +75,7 @@ def test_uniform_chains_without_film_differ_by_the_scale_of_force_alone():
     for profile in ("stiff", "compliant"):
         points, _ = _loads(config, profile, 0.3)
         chain = Chain.of(with_profile(BARE, profile))
-        largest = loads.largest_force(chain, math.radians(30))
+        largest = largest_force(chain, math.radians(30))
         found.append(force.score(points, "flex", 0.5, None, largest))
     assert found[0].r2 == pytest.approx(found[1].r2, abs=1e-6)
     assert found[0].rmse_percent == pytest.approx(found[1].rmse_percent, rel=1e-5)

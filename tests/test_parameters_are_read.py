@@ -20,7 +20,6 @@ from antennate import experiments
 from antennate.control.protocol import Protocol, Step
 from antennate.control.registry import BUILT_IN
 from antennate.experiments.force import experiment as force
-from antennate.experiments.force import physics as loads
 from antennate.robots.spec import RobotSpec
 from antennate_lab.reproduce import experiment as reproduce
 
@@ -316,8 +315,8 @@ def test_every_parameter_of_an_experiment_is_read_or_refused(
     steps = *sweeps(small, "leg_l0").steps, Step(maneuver="FORWARD", seconds=2.0)
     write(Path("small.mcap"), small, Protocol(steps=steps).made_for(small, CONTROL))
     monkeypatch.setattr(reproduce, "QUICK", PARTS)
-    for module in (loads, force):  # a bisection that is given no configuration, and takes long
-        monkeypatch.setattr(module, "largest_force", lambda chain, limit: 0.05)
+    # a bisection that is given no configuration, and takes long
+    monkeypatch.setattr(force, "largest_force", lambda chain, limit: 0.05)
     experiment = experiments.load(name)
     read: set[str] = set()
     for values in TINY[name]:

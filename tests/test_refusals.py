@@ -49,7 +49,7 @@ gait --config fitted :: expected a FILE, found fitted, a word that only these ta
 tunnel --trials many :: --trials: expected a whole number, found many
 tunnel --seed '' :: --seed: expected a whole number, found ''
 tunnel --robot '' :: --robot: expected  :: found nothing
-tunnel --robot scutle :: expected scuttle, scuttle3d, hexapod or a TOML file :: did you mean scuttle
+tunnel --robot scutle :: expected scuttle, scuttle3d, hexapod, bench or a TOML file :: did you mean scuttle
 tunnel --trials :: --trials: expected 1 value, INT, found none
 tunnel --trials 0 :: --trials: expected a number of at least 1, found 0
 tunnel --controllers dance :: controllers: expected one of open, timed, paper, closed, :: dance
@@ -186,7 +186,7 @@ climb --robot.links 3 --grounds gap:0.4 :: grounds: gap: expected at most the le
 climb --control.climb.low 0.2 :: control.climb: low: expected at most rise, 0.17 m, found 0.2
 climb --control.climb.feel.touch 0.1 :: control.climb.feel: missing: expected less than touch, 0.1, found 0.14
 geometry --gait.amplitude 0.6 :: gait.amplitude: expected at most 0.5087 rad
-geometry --robot.links 1 :: links: expected a number of at least 2, found 1
+geometry --robot.links 1 :: links: expected at least 2, or 1 of a bench (legs.kind none), found 1
 geometry --largest-amplitude 0.55 :: expected at most 0.5087 rad
 gait --optimise speed --gait.amplitude 0.6 :: the limit of the yaw joints
 gait --optimise fast :: speed
@@ -247,10 +247,10 @@ tracks --files a.csv --points.left a :: points: right: expected as many points
 tracks --files a.csv --points.left a b --points.right none --criteria.flex 1 :: criteria.flex: expected the default, as it is not read with two points
 """
 ROBOT = """
-robot check :: error: expected scuttle, scuttle3d, hexapod or a TOML file, found 'check'; a folder for the results is given as --out FOLDER
-robot scutle :: error: expected scuttle, scuttle3d, hexapod or a TOML file (did you mean scuttle?), found 'scutle'
-robot --robot scutle :: error: --robot: expected scuttle, scuttle3d, hexapod or a TOML file (did you mean scuttle?), found 'scutle'
-robot --export mjcf elsewhere :: error: expected scuttle, scuttle3d, hexapod or a TOML file, found 'elsewhere'; a folder for the results is given as --out FOLDER
+robot check :: error: expected scuttle, scuttle3d, hexapod, bench or a TOML file, found 'check'; a folder for the results is given as --out FOLDER
+robot scutle :: error: expected scuttle, scuttle3d, hexapod, bench or a TOML file (did you mean scuttle?), found 'scutle'
+robot --robot scutle :: error: --robot: expected scuttle, scuttle3d, hexapod, bench or a TOML file (did you mean scuttle?), found 'scutle'
+robot --export mjcf elsewhere :: error: expected scuttle, scuttle3d, hexapod, bench or a TOML file, found 'elsewhere'; a folder for the results is given as --out FOLDER
 robot hexapod scuttle :: expected flags only, found 'scuttle'; a folder for the results is given as --out FOLDER
 robot --export mjc :: --export: expected one of mjcf or urdf, found mjc; a folder for the results is given as --out FOLDER
 robot --export mjcf --scene tunle :: --scene: expected one of tunnel, :: did you mean tunnel?

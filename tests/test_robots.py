@@ -124,7 +124,8 @@ BAD = [
     ("[yaw]\nids = [1, 2, 3, 4, 4]", "ids: expected each once, found 4 more than once"),
     ("[yaw]\ndirections = [1, -1]", "yaw.directions: expected one for each of the 5 joints"),
     ("[antenna]\nactive_coils = []", "antenna.active_coils: expected at least 1 value"),
-    ("links = 1", "links: expected a number of at least 2, found 1"),
+    ("links = 1", "links: expected at least 2, or 1 of a bench (legs.kind none), found 1"),
+    ("links = 0", "links: expected a number of at least 1, found 0"),
     ("links = 'six'", "links: expected a whole number, found 'six'"),
     ("lynks = 8", "lynks: expected a known key (did you mean links?)"),
     (

@@ -13,7 +13,7 @@ from antennate.control.readers import HARDWARE_ALONE, unread_lift, unused
 from antennate.params.base import Params, number, require_different, require_whole_steps
 from antennate.params.gaits import GaitParams
 from antennate.params.scene import BenchPhysicsParams, PhysicsParams
-from antennate.robots.spec import RobotSpec
+from antennate.robots.spec import RobotSpec, WalkingRobot
 
 FORMAT = 1
 """Version of columns, splits and definitions; any change of them raises it."""
@@ -160,7 +160,7 @@ class DatasetConfig(Params):
     walk: WalkParams = WalkParams()
     gap: GapParams = GapParams()
     push: PushParams = PushParams()
-    robot: RobotSpec = RobotSpec()
+    robot: WalkingRobot = RobotSpec()
     gait: GaitParams = GaitParams()
     physics: PhysicsParams = PhysicsParams()
     bench: BenchPhysicsParams = BenchPhysicsParams()

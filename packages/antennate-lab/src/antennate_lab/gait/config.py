@@ -27,7 +27,7 @@ from antennate.params.base import (
 from antennate.params.control import GaitParams
 from antennate.params.scene import PhysicsParams
 from antennate.robots.mechanics import require_wave
-from antennate.robots.spec import RobotSpec
+from antennate.robots.spec import RobotSpec, WalkingRobot
 from antennate.types import Floats
 
 GROUPS = ("robot", "gait")
@@ -136,7 +136,7 @@ class GaitStudyConfig(Params):
         "none", "1", "assumed: the gait is walked as it is given"
     )
     """What one more gait is best at by the model; `cost` is that of gaits as fast as the given."""
-    robot: RobotSpec = RobotSpec()
+    robot: WalkingRobot = RobotSpec()
     gait: GaitParams = GaitParams()
     physics: PhysicsParams = PhysicsParams()
 

@@ -15,7 +15,7 @@ from antennate.params.base import Params, number, require_whole_steps
 from antennate.params.gaits import GAITS, GaitParams
 from antennate.params.scene import PhysicsParams
 from antennate.robots.mechanics import best_lead, cycles, require_wave, twist_map
-from antennate.robots.spec import RobotSpec
+from antennate.robots.spec import RobotSpec, WalkingRobot
 from antennate.types import Floats, Maneuver
 from antennate_lab.gait.config import GaitStudyConfig
 from antennate_lab.gait.physics import measure, walk_flat
@@ -79,7 +79,7 @@ class GeometryConfig(Params):
     """What counts as a body length; the length of the robot if not given."""
     measured: float | None = number(None, "1", "assumed: nobody measured it")
     """Body lengths a cycle that a real robot was measured to walk."""
-    robot: RobotSpec = RobotSpec()
+    robot: WalkingRobot = RobotSpec()
     gait: GaitParams = GaitParams()
     physics: PhysicsParams = PhysicsParams()
 

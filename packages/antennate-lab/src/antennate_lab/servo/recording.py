@@ -65,8 +65,10 @@ class ServoConfig(Params):
     """Recordings: JSON of Rhoban/bam, or logs of `drive` with --joint."""
     joint: str | None = number(None, "1", "assumed: has to be named if a recording is a log")
     """Joint of a log."""
-    servo: ServoName = number("xl330_m288", "1", "assumed: the model with a known recording")
-    """Model of the servo."""
+    servo: ServoName = number(
+        "xl330_m288", "1", "assumed: the model with a known recording", metavar="MODEL"
+    )
+    """Model of the servo, one of those in [servos]."""
     servos: ServosParams = ServosParams()
     mass: float | None = number(None, "kg", "assumed: as the recording says", ge=0)
     """Mass at the end of the arm; as the recording says if not given."""

@@ -242,3 +242,19 @@ def _matched_coils(antenna: AntennaSpec) -> float:
         else:
             high = middle
     return low
+
+
+def largest_force(chain: Chain, limit: float | Floats) -> float:
+    """Force normal to the tip that turns the first hinge by its limit, by bisection [N].
+
+    Args:
+        chain: The chain, bent on the branch that begins straight.
+        limit: Angle of all hinges, or of each, shape (n,) [rad].
+    """
+    most = float(np.max(limit))
+    low, high = 0.0, 4.0 * most * float(chain.stiffness.max()) / float(chain.lengths.min())
+    while high - low > 1e-9 * high:
+        middle = (low + high) / 2
+        rest = equilibrium(chain, np.array([chain.length]), np.array([[0.0, middle]]), True)
+        low, high = (middle, high) if bool((abs(rest.angles[0]) < limit).all()) else (low, middle)
+    return low

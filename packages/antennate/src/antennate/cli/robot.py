@@ -328,6 +328,11 @@ def _sentence(result: Mapping[str, Any]) -> str:
     if "export" in result:
         return export.sentence(result)
     power = _supply(result)
+    if not any(name.startswith("leg_") for name in result["joints"]):
+        return (
+            f"Servos draw at most {power.peak:.1f} A, and {power.stall:.1f} A if they stall; fuse "
+            f"{power.fuse:g} A; it does not walk."
+        )
     drawn = f"{power.walking:.1f} A while walking, at most {power.peak:.1f} A"
     return (
         f"{len(result['joints'])} servos draw {drawn}, and {power.stall:.1f} A if all of them "

@@ -30,7 +30,8 @@ from antennate.hardware.setup.servos import Assembly, Joint, JointState, ServoSe
 from antennate.hardware.setup.zeros import Positions, Zeroing, by_group, forgotten, measured
 from antennate.host import HostClock, StopOnce
 from antennate.messages import nearest, shortened, typed
-from antennate.robots.spec import RobotSpec
+from antennate.params.toml_text import Key, Value
+from antennate.robots.spec import ROBOTS, RobotSpec
 from antennate.studies.tables import Table
 from dynamixel_bus.bus import Bus
 from dynamixel_bus.models import model_name
@@ -119,8 +120,15 @@ def _ports(person: TerminalPerson, config: SetupConfig, options: SetupOptions, p
             )
     if not known["bus"]:
         raise ConfigError("--bus: expected a serial port, found none; nothing can be set up")
-    change(path, {("ports", name): port for name, port in known.items() if port})
+    change(path, _base(config.robot, path) | {("ports", n): p for n, p in known.items() if p})
     return known["bus"]
+
+
+def _base(robot: RobotSpec, path: Path) -> dict[Key, Value]:
+    """The name of a robot that is not the default, for a new file, which later commands read."""
+    names = () if path.exists() else ROBOTS[1:]
+    name = next((name for name in names if RobotSpec.named(name) == robot), None)
+    return {("robot", "base"): name} if name else {}
 
 
 def _servos(

@@ -161,7 +161,8 @@ def _serve_robot(config: TwinConfig, places: Places, orders: Orders | None) -> i
         finally:
             invalid = f"physics became invalid: {robot.failure}; " if robot.failure else ""
             late = f"its latest tick was {1e3 * server.late:.1f} ms late"
-            say(f"The twin has ended: {invalid}{passage.summary}; {late}.")
+            came = passage.summary if config.robot.leg_count else "the bench stood where it was"
+            say(f"The twin has ended: {invalid}{came}; {late}.")
     return OK
 
 

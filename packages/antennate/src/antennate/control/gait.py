@@ -78,10 +78,10 @@ def targets(
     yaw = np.minimum(np.maximum(yaw, -largest), largest)
     if robot.legs.kind == "rolling":
         leg = (phase[:, None] - links)[:, :, None] + _SIDES
-    elif lifting:
+    elif lifting and robot.leg_count:
         leg = _lifting(params.lift, phase, robot.links)
     else:
-        leg = np.zeros((phase.shape[0], robot.links, len(_SIDES)))
+        leg = np.zeros(robot.command_shapes(phase.shape[0])["leg"])
     antenna = np.full((phase.shape[0], robot.antenna_count), params.antenna_mean)
     if sweep is not None and params.antenna_amplitude:
         antenna += params.antenna_amplitude * np.sin(sweep)[:, None]

@@ -9,7 +9,7 @@ from antennate.params.control import (
 from antennate.params.gaits import LiftParams
 from antennate.robots.antenna import AntennaSpec
 from antennate.robots.imu import ImuParams
-from antennate.robots.joints import BaseParams, ElevationParams
+from antennate.robots.joints import BaseParams, ElevationParams, LegParams, YawParams
 from antennate.robots.servos import ServosParams
 from antennate.robots.spec import RobotSpec
 
@@ -69,7 +69,13 @@ def unused(robot: RobotSpec) -> dict[str, str]:
     paths = paths_of(ServosParams, "robot.servos")
     servos = (path for path in paths if path.rpartition(".")[0] not in used)
     reasons = dict.fromkeys(servos, "no joint of the robot has this servo")
-    if robot.legs.kind == "rolling":
+    if not robot.leg_count:
+        legs = (f"robot.legs.{name}" for name in LegParams.model_fields if name != "kind")
+        names = ("radius", "eccentricity", "width", "mass", "friction")
+        yaw = (f"robot.yaw.{name}" for name in YawParams.model_fields)
+        paths = (*legs, *(f"robot.leg_{name}" for name in names), *yaw, "robot.pitch.stiffness")
+        reasons |= dict.fromkeys(paths, "a bench has one link and no legs")
+    elif robot.legs.kind == "rolling":
         lifting = ("robot.legs.limit", "robot.legs.reach")
         reasons |= dict.fromkeys(lifting, "only legs of the kind lifting have it")
     if robot.pitch.kind == "actuated":
@@ -83,6 +89,10 @@ def unused(robot: RobotSpec) -> dict[str, str]:
     if not robot.has_imu:
         paths = (f"robot.imu.{name}" for name in ImuParams.model_fields if name != "kind")
         reasons |= dict.fromkeys(paths, "the robot has no inertial sensor")
+    if robot.antenna_count == 1:
+        paths = ("robot.antennae.right_stiffness", "robot.antennae.right_gain")
+        paths = (*paths, "robot.antenna.base_spacing")
+        reasons |= dict.fromkeys(paths, "the robot has one antenna")
     if not robot.antenna_count:
         bases = (f"robot.antennae.{name}" for name in BaseParams.model_fields if name != "kind")
         paths = (*bases, *paths_of(AntennaSpec, "robot.antenna"))

@@ -18,7 +18,7 @@ from antennate.messages import shown
 from antennate.params.base import paths_of
 from antennate.params.climb import HeadingParams
 from antennate.params.control import ControlParams
-from antennate.robots.spec import RobotSpec
+from antennate.robots.spec import RobotSpec, require_walking
 from antennate.types import Controller
 
 ControllerMaker = Callable[[str, ControlParams, RobotSpec, int], Controller]
@@ -159,6 +159,7 @@ def make_controller(
     robot = RobotSpec() if robot is None else robot
     checks.instance("control", control, ControlParams)
     checks.instance("robot", robot, RobotSpec)
+    require_walking(robot, f"the controller {name!r}" if isinstance(name, str) else "a controller")
     batch = checks.whole("batch", batch, least=1)
     own = control.model_copy(deep=True), robot.model_copy(deep=True)  # which it may spoil
     try:

@@ -71,6 +71,16 @@ class RobotConfig(Params):
     limits: SupervisorParams = SupervisorParams()
     network: NetworkParams = NetworkParams()
 
+    @model_validator(mode="after")
+    def _right_antenna_is_there(self) -> Self:
+        names = ("calibration_right", "sensor_id_right", "reach_right")
+        given = next((name for name in names if getattr(self, name) is not None), None)
+        if self.control.conditioning_right is not None:
+            given = "control.conditioning_right"
+        if self.robot.antenna_count == 1 and given is not None:
+            raise ValueError(f"{given}: expected none for a robot with one antenna, found one")
+        return self
+
     @property
     def reaches(self) -> tuple[float | None, float | None]:
         """`reach` of the left and the right antenna [spans], None for the default."""

@@ -27,8 +27,8 @@ class JointParams(Params):
     """One group of joints, in the order of the robot's joints."""
 
     lists: ClassVar[tuple[str, ...]] = ("ids", "directions", "zeros")
-    servo: ServoName = number("xc430_w240", "1", "paper: XC430-W240 in the body")
-    """Model of the group's servos."""
+    servo: ServoName = number("xc430_w240", "1", "paper: XC430-W240 in the body", metavar="MODEL")
+    """Model of the group's servos, one of those in [servos]."""
     ids: tuple[_Id, ...] = number((), "1", "assumed: set by hand; joints from 1 if not given")
     """Ids on the bus."""
     directions: tuple[_Direction, ...] = number((), "1", "assumed: mounted alike; all 1 if empty")
@@ -112,8 +112,9 @@ class LegParams(JointParams):
     """The legs of all links, head first, left before right."""
 
     lists: ClassVar[tuple[str, ...]] = (*JointParams.lists, "friction_factors")
-    kind: Literal["rolling", "lifting"] = number("rolling", "1", "paper: O-legs")
-    """Rolling legs turn about the pitch axis without end, lifting legs about the roll axis."""
+    kind: Literal["rolling", "lifting", "none"] = number("rolling", "1", "paper: O-legs")
+    """Rolling legs turn about the pitch axis without end, lifting legs about the roll axis; a bench
+    has none."""
     fastest: float = number(
         5.26, "rad/s", "assumed: it leaves a fifth of torque at 10.8 V (docs/science/pace.md)", gt=0
     )
@@ -138,10 +139,10 @@ class LegParams(JointParams):
 class BaseParams(JointParams):
     """The bases of both antennae, left before right."""
 
-    kind: Literal["pair", "none"] = number("pair", "1", "paper: two antennae")
-    """Whether the robot has antennae."""
-    servo: ServoName = number("xl330_m288", "1", "paper: XL330 at the antennae")
-    """Model of the group's servos."""
+    kind: Literal["pair", "left", "none"] = number("pair", "1", "paper: two antennae")
+    """Which antennae the robot has; the left one alone only without legs."""
+    servo: ServoName = number("xl330_m288", "1", "paper: XL330 at the antennae", metavar="MODEL")
+    """Model of the group's servos, one of those in [servos]."""
     fastest: float = number(
         4.5,
         "rad/s",
@@ -173,8 +174,10 @@ class ElevationParams(JointParams):
 
     kind: Literal["none", "pair"] = number("none", "1", "paper: antennae stay in the plane")
     """Whether the antennae have them."""
-    servo: ServoName = number("xl330_m288", "1", "assumed: as the bases, which they carry")
-    """Model of the group's servos."""
+    servo: ServoName = number(
+        "xl330_m288", "1", "assumed: as the bases, which they carry", metavar="MODEL"
+    )
+    """Model of the group's servos, one of those in [servos]."""
     fastest: float = number(4.5, "rad/s", "assumed: as the bases", gt=0)
     """Fastest that goals move."""
     limit: float = number(

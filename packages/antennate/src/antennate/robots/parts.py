@@ -17,6 +17,8 @@ from dynamixel_bus.model import Rating, ServoModel
 
 PLUG = 3.0
 """Rated current of a contact of the servos' plugs, JST EH [A] (datasheet JST eEH)."""
+CELLS_FROM = 9.0
+"""Voltage of servos from which on three lithium cells feed them, empty or full [V]."""
 REGULATOR_EFFICIENCY = 0.9
 """Efficiency of the step-down converter for the antennae (assumed: usual at half its load)."""
 WALKING_SHARE = 0.1
@@ -151,7 +153,7 @@ class Part:
 
 def bill(robot: RobotSpec) -> list[Part]:
     """All parts, servos first."""
-    return [*bought(robot), *_body(robot)]
+    return [*bought(robot), *_body(robot), *(_antennae(robot) if robot.antenna_count else [])]
 
 
 def bought(robot: RobotSpec) -> list[Part]:
@@ -187,18 +189,14 @@ def _electronics(robot: RobotSpec) -> list[Part]:
     sensor = robot.antenna.sensor
     length = 1000 * robot.antenna.sensed_hinges * robot.antenna.link_length
     kind = "flex sensor" if sensor.kind == "flex" else "pressure strip"
+    pins = "pins 34 and 35" if robot.antenna_count > 1 else "pin 34"
     ohms = f"{sensor.divider_resistance / 1000:g} kOhm, 1 %"
     return [
         adapter,
-        Part(1, "ESP32 board (WROOM or WROVER)", "antennae", "ADC1 pins 34 and 35, USB"),
-        Part(
-            2,
-            kind,
-            "one along each antenna",
-            f"{length:.0f} mm",
-        ),
-        Part(2, "resistor", "divider of each antenna", ohms),
-        Part(2, "capacitor", "across that resistor", DIVIDER_CAPACITOR),
+        Part(1, "ESP32 board (WROOM or WROVER)", "antennae", f"ADC1 {pins}, USB"),
+        Part(robot.antenna_count, kind, "one along each antenna", f"{length:.0f} mm"),
+        Part(robot.antenna_count, "resistor", "divider of each antenna", ohms),
+        Part(robot.antenna_count, "capacitor", "across that resistor", DIVIDER_CAPACITOR),
         *([Part(1, *INERTIAL)] if robot.has_imu else []),
     ]
 
@@ -212,8 +210,10 @@ def _power(power: Supply) -> list[Part]:
             "battery, three lithium cells",
             "all servos",
             f"{amperes}, {power.least_capacity:.1f} Ah or more",
-        ),
-        Part(1, "fuse and holder", "at the plus pole of the battery", f"{power.fuse:g} A"),
+        )
+        if main.voltage > CELLS_FROM
+        else Part(1, "power supply", "all servos", amperes),
+        Part(1, "fuse and holder", "at the plus pole of the supply", f"{power.fuse:g} A"),
         Part(
             1,
             "emergency stop, opens when it is pressed",
@@ -239,29 +239,30 @@ def _power(power: Supply) -> list[Part]:
 
 
 def _body(robot: RobotSpec) -> list[Part]:
+    if not robot.leg_count:
+        return [Part(1, "clamp with a bracket", "antenna's servo", "holds on a table")]
     legs = "O-leg" if robot.legs.kind == "rolling" else "leg"
     radius = 1000 * robot.leg_radius
-    body = [
+    return [
         Part(
             robot.links, "link frame", "body", f"{1000 * robot.link_pitch:g} mm from joint to joint"
         ),
         Part(robot.leg_count, legs, "one on each leg servo", f"outer radius {radius:g} mm"),
     ]
-    return body + _antennae(robot) if robot.antenna_count else body
 
 
 def _antennae(robot: RobotSpec) -> list[Part]:
     coils = Counter(robot.antenna.active_coils)
     return [
         Part(
-            2 * robot.antenna.hinges,
+            robot.antenna_count * robot.antenna.hinges,
             "link",
             "antennae",
             f"{1000 * robot.antenna.link_length:.1f} mm",
         ),
         *(
             Part(
-                2 * count,
+                robot.antenna_count * count,
                 f"torsion spring of {turns:g} coils",
                 "antennae",
                 "stiff ones at the base",

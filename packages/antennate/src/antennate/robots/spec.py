@@ -9,9 +9,14 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import Any, ClassVar, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal, Self
 
-from pydantic import SerializerFunctionWrapHandler, model_serializer, model_validator
+from pydantic import (
+    AfterValidator,
+    SerializerFunctionWrapHandler,
+    model_serializer,
+    model_validator,
+)
 
 from antennate import checks
 from antennate.errors import ConfigError
@@ -34,7 +39,7 @@ from antennate.types import SIDES
 from dynamixel_bus.model import EXTENDED_MODE, POSITION_MODE
 
 GroupName = Literal["yaw", "legs", "antennae", "pitch", "elevation"]
-ROBOTS = ("scuttle", "scuttle3d", "hexapod")
+ROBOTS = ("scuttle", "scuttle3d", "hexapod", "bench")
 """Robots that are known by name; each is a file beside this one."""
 CLEARANCE = 0.002
 """Gap that neighbouring legs keep at the largest bend [m] (assumed: play of printed parts)."""
@@ -55,11 +60,15 @@ class Fitted(Params):
 
 
 class RobotSpec(Params):
-    """A walking robot: links with a pair of legs each, yaw joints between them, two antennae."""
+    """A robot: links with a pair of legs each, yaw joints between them, two antennae.
+
+    A bench is one link on a clamp, without legs, with one antenna or two. Of one antenna there is
+    the left one; what a frame holds of the right one is NaN.
+    """
 
     known: ClassVar[tuple[str, ...]] = ROBOTS
     choice: ClassVar[str] = f"{', '.join(ROBOTS)} or a TOML file of your own (default: {ROBOTS[0]})"
-    links: int = number(6, "1", "paper: six links", ge=2, le=50)
+    links: int = number(6, "1", "paper: six links", ge=1, le=50)
     """Number of links."""
     link_pitch: float = number(
         0.12, "m", "assumed: servos of 46.5 mm for yaw and pitch; legs stay apart", gt=0.03, le=1
@@ -134,8 +143,8 @@ class RobotSpec(Params):
 
     @property
     def leg_count(self) -> int:
-        """Number of legs, two a link."""
-        return len(SIDES) * self.links
+        """Number of legs, two a link; 0 of a bench."""
+        return 0 if self.legs.kind == "none" else len(SIDES) * self.links
 
     @property
     def pitch_count(self) -> int:
@@ -144,12 +153,12 @@ class RobotSpec(Params):
 
     @property
     def antenna_count(self) -> int:
-        """Number of antennae, 0 or 2."""
-        return len(SIDES) if self.antennae.kind == "pair" else 0
+        """Number of antennae, 0, 1 or 2."""
+        return {"none": 0, "left": 1, "pair": len(SIDES)}[self.antennae.kind]
 
     @property
     def elevation_count(self) -> int:
-        """Number of joints that raise and lower the antennae, 0 or 2."""
+        """Number of joints that raise and lower the antennae, one each or 0."""
         return self.antenna_count if self.elevation.kind == "pair" else 0
 
     @model_serializer(mode="wrap")
@@ -233,7 +242,8 @@ class RobotSpec(Params):
     @property
     def leg_names(self) -> tuple[str, ...]:
         """Names of the legs in the order of an array over (link, side)."""
-        return tuple(f"leg_{side}{i}" for i in range(self.links) for side in SIDES)
+        names = (f"leg_{side}{i}" for i in range(self.links) for side in SIDES)
+        return tuple(names) if self.leg_count else ()
 
     @property
     def joint_names(self) -> tuple[str, ...]:
@@ -273,7 +283,7 @@ class RobotSpec(Params):
         """Shapes of the arrays of a `JointCommand` for some robots, in the order of the joints."""
         shapes = {
             "yaw": (batch, self.yaw_count),
-            "leg": (batch, self.links, len(SIDES)),
+            "leg": (batch, self.leg_count // len(SIDES), len(SIDES)),
             "antenna": (batch, self.antenna_count),
         }
         shapes |= {"pitch": (batch, self.pitch_count)} if self.pitch_count else {}
@@ -401,6 +411,7 @@ class RobotSpec(Params):
 
     @model_validator(mode="after")
     def _agree(self) -> RobotSpec:
+        _check_kind(self)
         for name, group, count in self.groups:
             group.require_lists(name, count)
             speed = self.servos.of(group.servo).no_load_speed
@@ -441,12 +452,51 @@ class RobotSpec(Params):
         return self
 
 
+def require_walking(robot: RobotSpec, what: str) -> None:
+    """Check that a robot has legs."""
+    if not robot.leg_count:
+        raise ConfigError(
+            f"expected a robot that walks for {what}, found one without legs (legs.kind)"
+        )
+
+
+def _walking(robot: RobotSpec) -> RobotSpec:
+    if not robot.leg_count:
+        raise ValueError("expected a robot that walks, found one without legs (legs.kind)")
+    return robot
+
+
+WalkingRobot = Annotated[RobotSpec, AfterValidator(_walking)]
+"""The robot of a configuration whose command walks it."""
+
+
 def require_antennae(robot: RobotSpec, what: str) -> None:
-    """Check that a robot has antennae."""
+    """Check that a robot has antennae, and legs that answer to them."""
+    require_walking(robot, what)
     if not robot.antenna_count:
         raise ConfigError(
             f"expected a robot with antennae for {what}, found one without (antennae.kind)"
         )
+
+
+def _check_kind(robot: RobotSpec) -> None:
+    """Refuse what is neither a robot with legs nor a bench."""
+    kind = robot.antennae.kind
+    if robot.links < 2 and robot.leg_count:
+        raise ValueError(
+            f"links: expected at least 2, or 1 of a bench (legs.kind none), found {robot.links}"
+        )
+    if robot.links > 1 and not robot.leg_count:
+        raise ValueError(
+            f"links: expected 1 of a bench, which has no legs (legs.kind), found {robot.links}"
+        )
+    if kind == "left" and robot.leg_count:
+        raise ValueError(
+            "antennae.kind: expected pair or none with legs, as one that walks reads both sides, "
+            "found left"
+        )
+    if kind == "none" and not robot.leg_count:
+        raise ValueError("antennae.kind: expected left or pair of a bench, found none")
 
 
 def _check_mass(robot: RobotSpec) -> None:
@@ -455,7 +505,7 @@ def _check_mass(robot: RobotSpec) -> None:
         raise ValueError(
             f"mass must leave more than 10 g a link beside legs and antennae, found {robot.mass} kg"
         )
-    if robot.mass > robot.most_mass:
+    if robot.leg_count and robot.mass > robot.most_mass:
         raise ValueError(
             f"mass: expected at most {robot.most_mass:.3g} kg, which the servos of all legs raise "
             f"at their stall torque, found {robot.mass:g}"

@@ -10,7 +10,7 @@ from matplotlib.patches import FancyBboxPatch
 
 from antennate import figures as style
 from antennate.robots.antenna import BASE
-from antennate.robots.parts import Supply, supply
+from antennate.robots.parts import CELLS_FROM, Supply, supply
 from antennate.robots.servos import ServoParams
 from antennate.robots.spec import ANTENNA_PREFIXES, RobotSpec
 from antennate.types import SIDES
@@ -41,7 +41,7 @@ _DATA, _MAIN, _LOW = style.SERIES[0], "#C80000", "#FF8C00"
 def wiring(robot: RobotSpec) -> Figure:
     """The diagram; the order of the bus is that of the cable, head first."""
     power, places = supply(robot), _places(robot)
-    end = _FIRST - _lower(robot) - 2 * (robot.links - 1) * _ROW
+    end = _FIRST - _lower(robot) - 2 * (robot.links - 1) * _ROW if robot.leg_count else _CONVERTER
     legend = _told(power)
     low = end - 0.5 - 0.16 * legend.count("\n") - 0.2
     figure = Figure(figsize=(style.WIDTH, -low))
@@ -105,7 +105,7 @@ def _cable(robot: RobotSpec) -> list[str]:
     order = [*robot.elevation_names, *(reversed(bases) if robot.elevation_count else bases)]
     for link in range(robot.links):
         order += [f"{kind}{link}" for kind in ("yaw", "pitch") if f"{kind}{link}" in names]
-        order += [f"leg_{side}{link}" for side in SIDES]
+        order += [name for side in SIDES if (name := f"leg_{side}{link}") in names]
     return order
 
 
@@ -185,11 +185,12 @@ def _box(
 def _electronics(axes: Axes, power: Supply, robot: RobotSpec, converter: float) -> None:
     """Battery, fuse, stop, converter and adapter above, and the board of the antennae."""
     main = power.rails[0].voltage
+    battery = f"battery {main:g} V\n{power.least_capacity:.1f} Ah or more\ncan feed a stall"
     for step, text in enumerate(
         (
-            f"battery {main:g} V\n{power.least_capacity:.1f} Ah or more\ncan feed a stall",
+            battery if main > CELLS_FROM else f"supply {main:g} V\n{power.stall:.1f} A or more",
             f"fuse {power.fuse:g} A",
-            f"emergency stop\n{power.stall:.0f} A",
+            f"emergency stop\n{power.stall:.2g} A",
         )
     ):
         height = 0.42 if "\n" in text.partition("\n")[2] else _HEIGHT
@@ -198,7 +199,7 @@ def _electronics(axes: Axes, power: Supply, robot: RobotSpec, converter: float) 
     _box(axes, (_ADAPTER, _TOP), "computer", style.INK, 0.9)
     _box(axes, (_ADAPTER, _TOP - _STEP), "USB adapter\n(U2D2)", _DATA, 0.9)
     if robot.antenna_count:
-        _board(axes, robot.has_imu)
+        _board(axes, robot.has_imu, robot.antenna_count)
     for rail in power.rails[1:]:
         text = f"converter {rail.voltage:g} V\n{rail.stall:.1f} A"
         _box(axes, (_SUPPLY, converter), text, _LOW, 1.0)
@@ -209,14 +210,21 @@ def _electronics(axes: Axes, power: Supply, robot: RobotSpec, converter: float) 
         _warning(axes, main, rail.voltage, 0.26 if robot.has_imu else 0.0)
 
 
-def _board(axes: Axes, imu: bool) -> None:
+def _board(axes: Axes, imu: bool, antennae: int) -> None:
     """The board of the antennae, and what hangs on it, right of the computer."""
     ink, above = style.INK, _TOP + 0.27
     _line(axes, [(_ADAPTER, _TOP), (_BOARD, _TOP), (_BOARD, _TOP - _STEP)], ink, 1.1)
     _line(axes, [(_BOARD, _TOP), (_BOARD, above), (_GROUND, above), (_GROUND, _TOP)], ink, 0.9)
     _joint(axes, (_GROUND, _TOP), ink)
-    _box(axes, (_BOARD, _TOP), "antenna board (ESP32)\n3V3, GPIO34, 35", ink, 1.38)
-    dividers = "two dividers:\nflex sensor above,\nresistor to ground"
+    _box(
+        axes,
+        (_BOARD, _TOP),
+        f"antenna board (ESP32)\n3V3, GPIO34{', 35' * (antennae > 1)}",
+        ink,
+        1.38,
+    )
+    dividers = "two dividers" if antennae > 1 else "divider"
+    dividers += ":\nflex sensor above,\nresistor to ground"
     _box(axes, (_BOARD, _TOP - _STEP), dividers, ink, 1.2, 0.42)
     if imu:
         beside, sensor = _BOARD + 0.67, _TOP - 1.85 * _STEP

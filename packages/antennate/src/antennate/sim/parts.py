@@ -145,7 +145,7 @@ def build_robot(params: RobotSpec) -> mujoco.MjSpec:
         if i:
             _add_link_joints(spec, link, i, params)
         _add_link_shape(link, params)
-        for s, sign in enumerate(SIDE_SIGN):
+        for s, sign in enumerate(SIDE_SIGN if params.leg_count else ()):
             _add_leg(spec, link, len(SIDES) * i + s, sign, params)
         parent = link
     if params.antenna_count:
@@ -254,10 +254,12 @@ def _add_leg(
 def _attach_antennae(spec: mujoco.MjSpec, params: RobotSpec) -> None:
     head = spec.body(params.link_names[0])
     servo = params.servo_of(params.antennae)
-    for i, (prefix, sign) in enumerate(zip(ANTENNA_PREFIXES, SIDE_SIGN, strict=True)):
+    count = params.antenna_count
+    aside = params.antenna.base_spacing / 2 if count > 1 else 0.0
+    for i, (prefix, sign) in enumerate(zip(ANTENNA_PREFIXES[:count], SIDE_SIGN, strict=False)):
         side = "left" if sign > 0 else "right"
         turn = mounting_quaternion(params.antenna.base_angle, side)
-        place = [params.link_pitch / 2, sign * params.antenna.base_spacing / 2, 0.0]
+        place = [params.link_pitch / 2, sign * aside, 0.0]
         antenna = params.antenna if sign > 0 else params.right_antenna
         part = build_antenna(antenna, servo, side)
         if params.elevation_count:

@@ -33,7 +33,8 @@ class Places:
         root: First coordinate of the head's free joint.
         root_speed: First degree of freedom of it.
         yaw, legs: Coordinates of these joints, shape (Y,) and (2 L,).
-        hinges: Coordinates of the hinges under the flex sensors, shape (2, n).
+        hinges: Coordinates of the hinges under the flex sensors, shape (2, n), (1, n) of a robot
+            with one antenna.
         bent: Coordinates of all hinges of the antennae, one antenna after the other, shape (n,).
         bounded: Coordinates of all joints that do not turn without end, shape (n,).
         drives: Actuators of all driven joints in the robot's order, shape (n,).
@@ -59,7 +60,7 @@ class Places:
         self.legs: Ints = coordinates(list(robot.leg_names))
         sensed = robot.antenna.sensed_hinges
         self.bent: Ints = bent
-        self.hinges: Ints = bent.reshape(len(ANTENNA_PREFIXES), -1)[:, :sensed]
+        self.hinges: Ints = bent.reshape(len(prefixes) or len(ANTENNA_PREFIXES), -1)[:, :sensed]
         pitch = coordinates(list(robot.pitch_names))
         elevation = coordinates(list(robot.elevation_names))
         self.bounded: Ints = np.concatenate([self.yaw, pitch, bent, elevation])
@@ -67,7 +68,8 @@ class Places:
         self.driven: Ints = coordinates(names)
         self.turning: Ints = np.array([model.joint(prefix + n).dofadr[0] for n in names])
         self.links: Ints = np.array([model.body(prefix + n).id for n in robot.link_names])
-        self.leg_geoms: Ints = np.array([model.geom(prefix + n).id for n in robot.leg_names])
+        legs = [model.geom(prefix + n).id for n in robot.leg_names]
+        self.leg_geoms: Ints = np.array(legs, np.int64)
         self.obstacles: Bools = (model.geom_contype & OBSTACLE_BIT) != 0
         owner = model.body_rootid[model.geom_bodyid]
         self.own: Bools = owner == model.body(prefix + robot.link_names[0]).id

@@ -1,7 +1,8 @@
 """The simulated robot: a batch of worlds stepped in lockstep, whose states one look serves.
 
-A row holds one world or none. An empty row, one whose simulation failed, and a robot without
-antennae read NaN, which the controller takes for UNKNOWN. Rows never influence one another.
+A row holds one world or none. An empty row, one whose simulation failed, and an antenna that the
+robot does not have read NaN, which the controller takes for UNKNOWN. Rows never influence one
+another.
 """
 
 from __future__ import annotations
@@ -131,7 +132,7 @@ class SimRobot:
         self._rows: dict[int, _Row] = {}
         self._failures: dict[int, SimulationError] = {}
         self._batch = batch
-        self._yaws = robot.yaw_count
+        self._yaws, self._antennae = robot.yaw_count, robot.antenna_count
         self._parts = list(robot.command_shapes())
         self._sensors = SensorChain(robot.antenna.sensor, (batch, 2), period)
         self._period = period
@@ -227,6 +228,7 @@ class SimRobot:
         flex = self._states.hinges.sum(axis=2) * self._bends
         counts = self._sensors.step(flex, noise, rows)
         counts[self._missing] = np.nan
+        counts[:, self._antennae :] = np.nan
         joints = self._states.joints
         joints[:, : self._yaws] -= self._bias  # a servo reports angles about its own zero
         joints[self._empty] = np.nan

@@ -26,7 +26,7 @@ from antennate.params.scene import (
     VariationParams,
 )
 from antennate.robots.antenna import require_own_curve
-from antennate.robots.spec import RobotSpec
+from antennate.robots.spec import RobotSpec, WalkingRobot
 from antennate.sim.episode import Episode
 from antennate.sim.scenes.registry import CORRIDORS, SHIPPED, TUNNEL, check_name, make_scene
 from antennate.sim.scenes.scene import Scene, SceneInstance
@@ -51,7 +51,7 @@ class TrialConfig(Params):
     tunnel: TunnelParams = TunnelParams()
     corridors: CorridorsParams = CorridorsParams()
     ground: GroundParams = GroundParams()
-    robot: RobotSpec = RobotSpec()
+    robot: WalkingRobot = RobotSpec()
     variation: VariationParams = VariationParams()
     physics: PhysicsParams = PhysicsParams()
 

@@ -181,6 +181,7 @@ class TouchStimulus:
         antenna: The left antenna, for its springs and its flex sensor.
         right: The right one, as the left one if not given.
         right_gain: Bend that the right flex sensor feels over what the left one does.
+        count: Number of antennae, 1 for the left one alone.
     """
 
     def __init__(
@@ -189,8 +190,10 @@ class TouchStimulus:
         antenna: AntennaSpec,
         right: AntennaSpec | None = None,
         right_gain: float = 1.0,
+        count: int = 2,
     ) -> None:
-        self._antennae, self._gains = (antenna, right or antenna), np.array([1.0, right_gain])
+        self._antennae = (antenna, right or antenna)[:count]
+        self._gains = np.array([1.0, right_gain])
         for each in self._antennae:  # a first one takes 50 ms, for which a board may not be silent
             _press(each, each.length, flex=TOUCH_FLEX)
         self._timed = sorted(
@@ -244,6 +247,8 @@ def _read_touch(
             f"--touch: expected left or right, with or without :20mm, :10mm:60mm or :60deg, then "
             f"{when}, found {text!r}"
         )
+    if SIDES.index(match[1]) >= len(antennae):
+        raise BadInputError(f"--touch: expected left, the only antenna, found {text!r}")
     antenna = antennae[SIDES.index(match[1])]
     mark = 1e-3 * float(match[4]) if match[4] else antenna.length
     if match[2] is None or match[3] == "deg":

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import ClassVar
+from typing import Any, ClassVar
 
+from pydantic import model_validator
+
+from antennate.errors import ConfigError
 from antennate.params.base import Params, number, paths_of
 from antennate.params.gaits import GaitParams, LiftParams
 from antennate.params.hardware import BatteryParams
-from antennate.robots.spec import RobotSpec, require_antennae
+from antennate.robots.spec import RobotSpec
 from antennate.sim.episode import Episode
 from antennate.sim.scenes.scene import SceneInstance
 from antennate.sim.sim_robot import SimRobot
@@ -72,6 +75,17 @@ class TwinConfig(TrialConfig):
     robot: RobotSpec = RobotSpec()
     control: TwinControlParams = TwinControlParams()
 
+    @model_validator(mode="before")
+    @classmethod
+    def _bench_on_a_flat_floor(cls, values: Any) -> Any:
+        """Where nothing else is wished, a robot that does not walk stands on a flat floor."""
+        if isinstance(values, dict):
+            robot = values.get("robot")
+            robot = robot.model_dump() if isinstance(robot, RobotSpec) else robot
+            if isinstance(robot, dict) and (robot.get("legs") or {}).get("kind") == "none":
+                return {"scene": "flat"} | values
+        return values
+
 
 class Passage:
     """Follows the head through a scene.
@@ -129,7 +143,10 @@ def watched(config: TwinConfig, boot_id: int | None = None) -> tuple[TwinRobot, 
 
     Each start of a real board has a boot id of its own.
     """
-    require_antennae(config.robot, "the twin")
+    if not config.robot.antenna_count:
+        raise ConfigError(
+            "expected a robot with antennae for the twin, found one without (antennae.kind)"
+        )
     control, period = config.control, config.control.period
     scene = scene_of(config)
     start = draw_trial(config, scene, config.trial, control.gait, period)
@@ -138,8 +155,8 @@ def watched(config: TwinConfig, boot_id: int | None = None) -> tuple[TwinRobot, 
     body.load(0, start.world, start.chance)
     boot = config.trial + 1 if boot_id is None else boot_id
     own = config.robot
-    gain = own.antennae.right_gain
-    touch = TouchStimulus(config.touch, own.antenna, own.right_antenna, gain)
+    gain, count = own.antennae.right_gain, own.antenna_count
+    touch = TouchStimulus(config.touch, own.antenna, own.right_antenna, gain, count)
     passage = Passage(start.scene)
     robot = TwinRobot(
         body,

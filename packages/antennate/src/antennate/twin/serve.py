@@ -217,7 +217,7 @@ class TwinServer(_OrderedServer):
         word, _, rest = text.partition(" ")
         if word == "touch":
             self._robot.order_touch(rest)
-        elif text in ("hang", "floor"):
+        elif text in ("hang", "floor") and len(self._robot.world.places.legs):
             self._robot.hands.hanging = text == "hang"
         elif word == "fault":
             self._faults.order(rest)

@@ -10,6 +10,7 @@ from antennate.experiments.antenna.physics import (
     ANIMAL_CYCLE,
     Readings,
     Trace,
+    bending_of,
     ringdown_of,
     sensor_of,
     springs_of,
@@ -17,10 +18,13 @@ from antennate.experiments.antenna.physics import (
 )
 from antennate.experiments.antenna.result import (
     AntennaResult,
+    Bending,
     Point,
+    Pushed,
     Ringdown,
     Sensor,
     Springs,
+    Swing,
     Taper,
 )
 from antennate.studies.columns import columns, shown
@@ -29,6 +33,8 @@ from antennate.studies.tables import Table
 
 _SETS = 6
 """Most sets of springs in a table."""
+_MODES = 3
+"""Most modes in a table."""
 _BENDS = 10
 """Most bends in a table."""
 
@@ -37,12 +43,13 @@ _BENDS = 10
 class AntennaOutcome(RunOutcome):
     """An antenna, its readings, and the path of its tip."""
 
+    config: AntennaConfig
     found: AntennaResult
     readings: Readings
     trace: Trace
 
     def result(self) -> AntennaResult:
-        """Springs, taper, sensor and ring-down."""
+        """Springs, taper, sensor, ring-down and bending."""
         return self.found
 
 
@@ -52,18 +59,57 @@ def run(config: AntennaConfig) -> AntennaOutcome:
     sensor, readings = sensor_of(config)
     ringdown, trace = ringdown_of(config)
     found = AntennaResult(
-        seed=config.seed, springs=springs, taper=taper, sensor=sensor, ringdown=ringdown
+        seed=config.seed,
+        springs=springs,
+        taper=taper,
+        sensor=sensor,
+        ringdown=ringdown,
+        bending=bending_of(config),
     )
-    return AntennaOutcome(found, readings, trace)
+    return AntennaOutcome(config, found, readings, trace)
 
 
 def tables(result: AntennaResult) -> Sequence[Table]:
-    """Tables of springs, taper, sensor and ring-down."""
+    """Tables of springs, taper, sensor, bending, ring-down and modes."""
     return (
         *_of_springs(result.springs),
         _of_taper(result.taper),
         _of_sensor(result.sensor),
+        _of_bending(result.bending),
         _of_ringdown(result.ringdown),
+        _of_modes(result.ringdown.modes),
+    )
+
+
+def _of_bending(found: Bending) -> Table:
+    step = -(-(len(found.curve) - 1) // (_BENDS - 1))
+    _, *measures = columns(Pushed)
+    return Table(
+        "Pushed at its tip",
+        [measure.title for measure in measures],
+        [(f"{p.tip_mm:.0f} mm aside", [m.cell(p) for m in measures]) for p in found.curve[::step]],
+        borne(found),
+    )
+
+
+def borne(found: Bending) -> str:
+    """The largest forces that an antenna bears on its tip, in one sentence."""
+    end = (
+        "the wire of spring {} yields"
+        if found.ends_by == "yield"
+        else ("hinge {} is at its stop; until then no wire yields")
+    )
+    return (
+        f"At the tip it bears {1e3 * found.bearable_n:.0f} mN before a hinge turns "
+        f"{found.angle_deg:g} deg, and {1e3 * found.sound_n:.0f} mN before "
+        f"{end.format(found.ends_at_hinge)}."
+    )
+
+
+def _of_modes(modes: Sequence[Swing]) -> Table:
+    return Table.of(
+        "First modes of the chain with its servo",
+        {f"mode {i + 1}": mode for i, mode in enumerate(modes[:_MODES])},
     )
 
 
@@ -156,6 +202,8 @@ EXPERIMENT = Experiment.of_folder(
     sentence,
     result=AntennaResult,
     captions={
+        "drawing": "The antenna to scale, from the side and from above, with what is to be made.",
+        "bending": "Force and reading over how far the tip is pushed aside.",
         "springs": "Torque of each spring up to its yield.",
         "taper": "Stiffness along the antenna of the animal, and along the springs of the robot.",
         "sensor": "Readings of one sensor over flex with the loop, a bend that is held, "

@@ -1,4 +1,4 @@
-"""The four figures of an antenna: springs, taper, sensor, ring-down."""
+"""The figures of an antenna: drawing, springs, taper, sensor, bending, ring-down."""
 
 from __future__ import annotations
 
@@ -9,8 +9,9 @@ import numpy as np
 
 from antennate import figures as style
 from antennate.antenna.dynamics import least_damping
+from antennate.experiments.antenna.drawing import drawing
 from antennate.experiments.antenna.physics import ANIMAL_CYCLE, Readings, Trace
-from antennate.experiments.antenna.result import Point, Ringdown, Sensor, Springs, Taper
+from antennate.experiments.antenna.result import Bending, Point, Ringdown, Sensor, Springs, Taper
 from antennate.types import Floats
 
 if TYPE_CHECKING:
@@ -32,14 +33,39 @@ _LADDER, _SUGGESTED = style.PROFILE_LOOKS["descending"][0], "#56B4E9"
 
 @style.styled
 def figures(outcome: AntennaOutcome) -> dict[str, Figure]:
-    """Figures of springs, taper, sensor and ring-down."""
+    """Figures by their names: the drawing first."""
     found = outcome.found
     return {
+        "drawing": drawing(outcome.config),
+        "bending": _of_bending(found.bending),
         "springs": _of_springs(found.springs),
         "taper": _of_taper(found.taper),
         "sensor": _of_sensor(found.sensor, outcome.readings),
         "ringdown": _of_ringdown(found.ringdown, outcome.trace),
     }
+
+
+def _of_bending(found: Bending) -> Figure:
+    """Force and reading over the tip's deflection, and where a hinge turns too far."""
+    figure = style.canvas(style.WIDTH, 4.6)
+    panels = figure.subplots(2, 1, sharex=True)
+    colours = style.series(2)
+    tip = [push.tip_mm for push in found.curve]
+    borne = np.interp(found.bearable_n, [push.force_n for push in found.curve], tip)
+    for panel, name, scale, label, colour in (
+        (panels[0], "force_n", 1e3, "force [mN]", colours[0]),
+        (panels[1], "counts", 1.0, "reading [counts]", colours[1]),
+    ):
+        panel.plot(tip, [scale * getattr(push, name) for push in found.curve], color=colour)
+        panel.set(ylabel=label)
+        if found.bearable_n < found.curve[-1].force_n:
+            panel.axvline(borne, color=style.MUTED, linewidth=0.8)
+    panels[0].set_title(
+        f"Bears {1e3 * found.bearable_n:.0f} mN up to {found.angle_deg:g} deg a hinge,\n"
+        f"{1e3 * found.sound_n:.0f} mN up to the first {found.ends_by}"
+    )
+    panels[1].set(xlabel="tip aside [mm]", xlim=(0, None))
+    return figure
 
 
 def _of_springs(of: Springs) -> Figure:

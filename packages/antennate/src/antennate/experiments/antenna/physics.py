@@ -11,11 +11,14 @@ import numpy as np
 
 from antennate.antenna import sensor, springs
 from antennate.antenna.dynamics import LinearChain, Mode, fitted_mode
+from antennate.antenna.statics import Chain, equilibrium, largest_force, shape
 from antennate.errors import ConfigError
 from antennate.experiments.antenna.config import AntennaConfig
 from antennate.experiments.antenna.result import (
+    Bending,
     Ladder,
     Point,
+    Pushed,
     Ringdown,
     Sensor,
     Spring,
@@ -37,6 +40,8 @@ E24 = (
     *(3.3, 3.6, 3.9, 4.3, 4.7, 5.1, 5.6, 6.2, 6.8, 7.5, 8.2, 9.1),
 )
 """Resistors to be had in each decade (IEC 60063, series E24)."""
+_FORCES = 400
+"""Forces among which the one is looked for that moves the tip farthest."""
 ANIMAL_CYCLE = 0.05
 """Cycle in which a cockroach's antenna loses over 90 % of a deflection [s] (Mongeau 2014)."""
 
@@ -215,6 +220,42 @@ def _hold(config: AntennaConfig) -> Floats:
         for i in range(ticks)
     ]
     return np.array(rows)
+
+
+def bending_of(config: AntennaConfig) -> Bending:
+    """The antenna under forces on its tip, and the largest ones that it bears."""
+    antenna, chain = config.antenna, Chain.of(config.antenna)
+    wire, coil = 1e-3 * config.wire_mm, 1e-3 * config.coil_mm
+    yields = np.array([springs.yield_angle(config, wire, coil, n) for n in antenna.active_coils])
+    limits = np.minimum(yields, antenna.range)
+    bearable = largest_force(chain, math.radians(config.angle_deg))
+    sound = largest_force(chain, limits)
+    bent, _ = _pushed(chain, np.array([sound]))
+    first = int(np.argmax(abs(bent[0]) / limits))
+    forces = np.linspace(0.0, sound, _FORCES)
+    farthest = forces[int(np.argmax(_pushed(chain, forces)[1]))]
+    forces = np.linspace(0.0, farthest, config.points)
+    angles, tip = _pushed(chain, forces)
+    flex = angles[:, : antenna.sensed_hinges].sum(axis=1)
+    most = abs(angles).max(axis=1)
+    counts = sensor.counts(antenna.sensor, flex)
+    rows = zip(1e3 * tip, forces, np.degrees(most), np.degrees(flex), counts, strict=True)
+    names = ("tip_mm", "force_n", "most_bent_deg", "flex_deg", "counts")
+    return Bending(
+        curve=[Pushed(**dict(zip(names, map(float, row), strict=True))) for row in rows],
+        bearable_n=bearable,
+        angle_deg=config.angle_deg,
+        sound_n=sound,
+        ends_by="yield" if yields[first] < antenna.range else "stop",
+        ends_at_hinge=first + 1,
+    )
+
+
+def _pushed(chain: Chain, forces: Floats) -> tuple[Floats, Floats]:
+    """Hinge angles [rad], shape (m, n), and how far the tip is aside [m], under forces (m,) [N]."""
+    force = np.stack([np.zeros_like(forces), forces], axis=1)
+    angles = equilibrium(chain, np.full(len(forces), chain.length), force, follower=True).angles
+    return angles, shape(chain, angles)[:, -1, 1]
 
 
 def ringdown_of(config: AntennaConfig) -> tuple[Ringdown, Trace]:

@@ -178,6 +178,41 @@ class Ringdown:
 
 
 @tabular
+class Pushed:
+    """The antenna at rest under a force on its tip, normal to its last link."""
+
+    tip_mm: float = column("tip aside", "mm", form=".1f")
+    """How far the tip is aside."""
+    force_n: float = column("force", "mN", form=".1f", scale=1e3)
+    """Force."""
+    most_bent_deg: float = column("most bent hinge", "deg", form=".1f")
+    """Angle of the hinge that is bent most."""
+    flex_deg: float = column("flex", "deg", form=".1f")
+    """Sum of the angles of the hinges under the flex sensor."""
+    counts: float = column("reading", "counts", form=".0f")
+    """Reading without memory and noise."""
+
+
+@tabular
+class Bending:
+    """What a force on the tip does to the antenna."""
+
+    curve: list[Pushed]
+    """Forces from none to the one at which the tip is farthest aside, or the first limit is
+    reached."""
+    bearable_n: float
+    """Largest force at which no hinge turns beyond `angle_deg`."""
+    angle_deg: float
+    """Angle that a spring must bear."""
+    sound_n: float
+    """Largest force at which no wire yields and no hinge is at its stop."""
+    ends_by: str
+    """What the next larger force does: `yield` of a wire, or `stop` of a hinge."""
+    ends_at_hinge: int
+    """Which hinge that is, 1 at the base."""
+
+
+@tabular
 class AntennaResult:
     """What a run comes to."""
 
@@ -193,3 +228,5 @@ class AntennaResult:
     """The flex sensor alone."""
     ringdown: Ringdown
     """The antenna after it is let go."""
+    bending: Bending
+    """The antenna under a force on its tip."""

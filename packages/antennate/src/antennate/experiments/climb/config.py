@@ -25,7 +25,7 @@ from antennate.params.base import (
 from antennate.params.control import ControlParams
 from antennate.params.scene import GroundParams, PhysicsParams, VariationParams
 from antennate.robots.servos import ServoName
-from antennate.robots.spec import RobotSpec
+from antennate.robots.spec import RobotSpec, WalkingRobot
 
 ROBOT = "scuttle3d"
 Condition = Literal["locked", "level", "lifted", "rhythm", "climb", "edges"]
@@ -158,7 +158,7 @@ class ClimbConfig(Params):
     """Time after which a trial on one step has failed; on stairs and in tunnels twice it."""
     seed: int = number(2711, "1", "assumed: any but 0, by which the controllers were tuned", ge=0)
     """Seed of all chance."""
-    robot: RobotSpec = RobotSpec.named(ROBOT)
+    robot: WalkingRobot = RobotSpec.named(ROBOT)
     """scuttle3d or another with pitch servos, or a TOML file of your own (default: scuttle3d)."""
     control: ControlParams = ControlParams()
     variation: VariationParams = VariationParams()

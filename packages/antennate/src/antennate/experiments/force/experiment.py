@@ -14,7 +14,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from antennate.antenna.statics import Chain, about, equilibrium, with_profile
+from antennate.antenna.statics import (
+    Chain,
+    about,
+    equilibrium,
+    largest_force,
+    with_profile,
+)
 from antennate.experiments.bench import between
 from antennate.experiments.force.explained import by_group, explained
 from antennate.experiments.force.physics import (
@@ -22,7 +28,6 @@ from antennate.experiments.force.physics import (
     Points,
     Traverse,
     drag,
-    largest_force,
     static_loads,
     traverse_points,
 )

@@ -208,16 +208,6 @@ class Points:
     age: Floats
 
 
-def largest_force(chain: Chain, limit: float) -> float:
-    """Force normal to the tip that turns the most bent hinge by `limit` [rad], by bisection [N]."""
-    low, high = 0.0, 4.0 * limit * float(chain.stiffness.max()) / float(chain.lengths.min())
-    while high - low > 1e-9 * high:
-        middle = (low + high) / 2
-        rest = equilibrium(chain, np.array([chain.length]), np.array([[0.0, middle]]), True)
-        low, high = (middle, high) if abs(rest.angles).max() < limit else (low, middle)
-    return low
-
-
 def static_loads(
     config: ForceConfig, profile: str, friction: float, largest: float
 ) -> tuple[Points, int]:

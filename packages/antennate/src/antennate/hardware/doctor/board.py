@@ -171,7 +171,7 @@ def findings(board: BoardSurvey, config: DoctorConfig) -> Iterator[tuple[Finding
         cure = "use a shorter cable, away from motors; check the ground of the board"
         broken = Finding(str(board.broken), "warn" if board.broken else "ok", cure)
         yield broken, "broken frames", "none"
-        for side, name in enumerate(("left", "right")):
+        for side, name in enumerate(("left", "right")[: config.robot.antenna_count or 2]):
             yield from _antenna(board, config, name, board.counts[:, side].tolist())
         yield from inertial.findings(board.readings, config)
     for sensor_id in dict.fromkeys((config.sensor_id, config.sensor_id_right)):

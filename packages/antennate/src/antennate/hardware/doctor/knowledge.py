@@ -27,7 +27,7 @@ def rows(config: DoctorConfig, bus: bool, esp32: bool) -> Iterator[Row]:
     other = _curve(right) if right else left or "that of the left one"
     axes = ", ".join(["x", "y", *_unstated(robot.imu, "gyro_step", "accel_step")])
     curve = f"`{typed('record')}`, `{typed('calibrate')}`, then calibration"
-    sided = esp32 and robot.antenna_count
+    sided, both = (esp32 and robot.antenna_count >= count for count in (1, 2))
     table: tuple[tuple[Any, str, Any, Grade, str], ...] = (
         (bus, "ids", ids and f"{ids_text(ids)} in the order of the joints", "warn",
          f"`{typed('setup')}` and `{typed('zero')}` write them"),
@@ -35,7 +35,7 @@ def rows(config: DoctorConfig, bus: bool, esp32: bool) -> Iterator[Row]:
         (bus, "supply limits", supply and f"{', '.join(supply)} V, of three lithium cells", "note",
          "set limits.supply_warn, supply_hold and supply_off to what your supply needs"),
         (sided, "left calibration", left, "warn", f"{curve} = FILE"),
-        (sided, "right calibration", other, "warn" if right or left else "note",
+        (both, "right calibration", other, "warn" if right or left else "note",
          f"{curve}_right = FILE"),
         (esp32 and robot.has_imu, "inertial axes", f"{axes}; at rest only z is seen", "note",
          "see IMU_AXES in firmware/config.py, robot.imu.gyro_step and accel_step"),
