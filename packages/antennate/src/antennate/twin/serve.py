@@ -8,6 +8,7 @@ import sys
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 
+from antennate.errors import BadInputError
 from antennate.host import claim
 from antennate.twin.faults import Faults
 from antennate.twin.orders import Orders
@@ -217,7 +218,9 @@ class TwinServer(_OrderedServer):
         word, _, rest = text.partition(" ")
         if word == "touch":
             self._robot.order_touch(rest)
-        elif text in ("hang", "floor") and len(self._robot.world.places.legs):
+        elif text in ("hang", "floor"):
+            if not len(self._robot.world.places.legs):
+                raise BadInputError("expected a robot with legs, found a bench on its clamp")
             self._robot.hands.hanging = text == "hang"
         elif word == "fault":
             self._faults.order(rest)
