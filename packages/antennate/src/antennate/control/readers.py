@@ -31,6 +31,8 @@ SIMULATION_ALONE = (
         f"robot.{name}"
         for name in (
             "mass",
+            "bodies",
+            "meshes",
             "leg_width",
             "leg_mass",
             "leg_friction",

@@ -40,7 +40,7 @@ _SIDES = np.array([0.0, math.pi])
 
 def body_of(robot: RobotSpec, frequency: float) -> Body:
     """The body of a robot that walks at a frequency [Hz]."""
-    weight = np.full(robot.links, GRAVITY * (robot.link_mass + 2 * robot.leg_mass))
+    weight = GRAVITY * (np.array(robot.link_masses) + 2 * robot.leg_mass)
     weight[0] += GRAVITY * robot.antenna_count * robot.antenna.mass
     pitch = robot.servo_of(robot.pitch).stiffness
     yaw = robot.servo_of(robot.yaw)

@@ -24,6 +24,7 @@ from antennate.messages import shown
 from antennate.params.base import Params, number, own_file, read_file
 from antennate.params.scene import GRAVITY
 from antennate.robots.antenna import BASE, AntennaSpec
+from antennate.robots.bodies import BodyParams
 from antennate.robots.imu import ImuParams
 from antennate.robots.joints import (
     STRAIGHT,
@@ -119,6 +120,13 @@ class RobotSpec(Params):
     imu: ImuParams = ImuParams()
     fitted: tuple[Fitted, ...] = number((), "1", "assumed: none; `antennate fit` writes them")
     """Numbers that were fitted to recordings; nothing is computed from them."""
+    bodies: tuple[BodyParams, ...] = number(
+        (), "1", "assumed: none, spine and beam of equal mass; `antennate build` writes them"
+    )
+    """Mass and inertia of each link and leg, all of them or none."""
+    meshes: str = number("", "1", "assumed: none; `antennate build` writes them")
+    """Folder with a file NAME.stl [mm] for each body that is drawn by it, seen from the robot's
+    file; it changes no motion."""
 
     @classmethod
     def named(cls, text: str | Path, folder: Path = Path()) -> Self:
@@ -134,7 +142,11 @@ class RobotSpec(Params):
         if str(text) in ROBOTS:
             return read_file(Path(__file__).with_name(f"{text}.toml"), cls)
         own = str(text and checks.path("robot", text))
-        return read_file(own_file("--robot", own, ROBOTS, folder), cls)
+        path = own_file("--robot", own, ROBOTS, folder)
+        robot = read_file(path, cls)
+        if not robot.meshes:
+            return robot
+        return robot.model_copy(update={"meshes": str((path.parent / robot.meshes).absolute())})
 
     @property
     def yaw_count(self) -> int:
@@ -163,7 +175,7 @@ class RobotSpec(Params):
 
     @model_serializer(mode="wrap")
     def _without_what_is_absent(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """A robot without inertial sensor or fitted numbers is written as before there were any."""
+        """A robot without what few robots have is written as before there was any of it."""
         table = handler(self)
         if isinstance(servos := table.get("servos"), dict):
             table["servos"] = servos | {
@@ -171,8 +183,9 @@ class RobotSpec(Params):
             }
         if self.imu == ImuParams():
             table.pop("imu", None)
-        if not self.fitted:
-            table.pop("fitted", None)
+        for name in ("fitted", "bodies", "meshes"):
+            if not getattr(self, name):
+                table.pop(name, None)
         return table
 
     @property
@@ -216,6 +229,12 @@ class RobotSpec(Params):
         antennae = self.antenna_count * self.antenna.mass
         antennae += self.elevation_count * self.elevation.mass
         return (self.mass - self.leg_count * self.leg_mass - antennae) / self.links
+
+    @property
+    def link_masses(self) -> tuple[float, ...]:
+        """Mass of each link without its legs [kg], head first."""
+        own = {body.name: body.mass for body in self.bodies}
+        return tuple(own.get(name, self.link_mass) for name in self.link_names)
 
     @property
     def most_mass(self) -> float:
@@ -509,4 +528,24 @@ def _check_mass(robot: RobotSpec) -> None:
         raise ValueError(
             f"mass: expected at most {robot.most_mass:.3g} kg, which the servos of all legs raise "
             f"at their stall torque, found {robot.mass:g}"
+        )
+    if robot.bodies:
+        _check_bodies(robot)
+
+
+def _check_bodies(robot: RobotSpec) -> None:
+    """Refuse bodies that are not those of the robot, or whose masses are not its own."""
+    names, wanted = [body.name for body in robot.bodies], robot.link_names + robot.leg_names
+    if sorted(names) != sorted(wanted):
+        raise ValueError(
+            f"bodies: expected each of {', '.join(wanted)} once, found {', '.join(names)}"
+        )
+    legs = [body.mass for body in robot.bodies if body.name in robot.leg_names]
+    if any(not math.isclose(mass, robot.leg_mass, rel_tol=1e-9) for mass in legs):
+        raise ValueError(f"bodies: expected legs of leg_mass, {robot.leg_mass:g} kg, found {legs}")
+    links = sum(robot.link_masses)
+    if not math.isclose(links, robot.links * robot.link_mass, rel_tol=1e-9):
+        found = robot.mass - robot.links * robot.link_mass + links
+        raise ValueError(
+            f"mass: expected {found:.9g} kg, that of all bodies, found {robot.mass:.9g}"
         )

@@ -18,9 +18,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any, Literal
 
 from antennate.errors import ConfigError
+from antennate.files import read_limited
 from antennate.robots.antenna import BASE, AntennaSpec
 from antennate.robots.servos import ServoParams
 from antennate.robots.spec import ANTENNA_PREFIXES, RobotSpec
@@ -42,6 +44,10 @@ STOPS: dict[str, Any] = {"limited": mujoco.mjtLimited.mjLIMITED_TRUE, "range": [
 """Ends of a joint that does not turn without end: half a turn either way (assumed)."""
 PLAY = "_play"
 """What the name of the hinge of a joint's backlash ends with, after that of the joint."""
+LARGEST_MESH = 20_000_000
+"""Most bytes of a mesh."""
+_HIDDEN = 3
+"""Group of geoms that no viewer shows."""
 _PLAY_STOP = (0.004, 1.0)
 """Time constant of the ends of the play [s], the stiffest at the usual timestep, and damping."""
 
@@ -150,7 +156,36 @@ def build_robot(params: RobotSpec) -> mujoco.MjSpec:
         parent = link
     if params.antenna_count:
         _attach_antennae(spec, params)
+    for body in params.bodies:
+        part = spec.body(body.name)
+        part.mass, part.ipos, part.fullinertia = body.mass, body.centre, body.inertia
+        part.explicitinertial = True
+    if params.meshes:
+        add_meshes(spec, Path(params.meshes))
     return spec
+
+
+def add_meshes(spec: mujoco.MjSpec, folder: Path) -> None:
+    """Draw bodies by the meshes of a folder, NAME.stl in mm in the frame of the body.
+
+    Args:
+        spec: The robot; it is changed. Shapes that touch stay as they are, and are hidden.
+        folder: Where the meshes are; a body without one is drawn as it is.
+
+    Raises:
+        ConfigError: It holds none, or one that cannot be read.
+    """
+    found = {body: folder / f"{body.name}.stl" for body in spec.bodies if body.name}
+    found = {body: file for body, file in found.items() if file.is_file()}
+    if not found:
+        raise ConfigError(f"robot.meshes: expected a folder with files such as link0.stl: {folder}")
+    for body, file in found.items():
+        for geom in body.geoms:
+            geom.group = _HIDDEN
+        spec.assets[file.name] = read_limited(file, LARGEST_MESH, ConfigError)
+        spec.add_mesh(name=body.name, file=file.name, scale=[1e-3] * 3)
+        geom = body.add_geom(type=mujoco.mjtGeom.mjGEOM_MESH, meshname=body.name, mass=0.0)
+        geom.contype = geom.conaffinity = 0
 
 
 def _add_hinge(

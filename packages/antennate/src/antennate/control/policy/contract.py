@@ -168,7 +168,7 @@ def _entry(quantity: Quantity) -> Entry:
 
 def _robot_table(robot: RobotSpec) -> dict[str, Any]:
     """All parameters of a robot but those that belong to its wiring."""
-    table = robot.model_dump(mode="json", exclude={"imu"})  # no policy observes it
+    table = robot.model_dump(mode="json", exclude={"imu", "meshes"})  # no policy observes them
     for path in (*HARDWARE_ALONE, "robot.legs.fastest"):
         *groups, name = path.split(".")[1:]
         group = table

@@ -63,7 +63,7 @@ def export_mjcf(
     alone = to_mjcf(lone_robot(config.physics, robot, _PERIOD), title)
     whole = to_mjcf(robot_in_scene(config.physics, world, drawn, _PERIOD), title)
     model = mujoco.MjModel.from_xml_string(whole.text, whole.assets)
-    lone = mujoco.MjModel.from_xml_string(alone.text)
+    lone = mujoco.MjModel.from_xml_string(alone.text, alone.assets)
     course = walk(world, gait, _PERIOD)
     shares = gear_shares(world.model, robot)[world.places.drives]
     loaded = {n: float(s) for n, s in zip(robot.joint_names, shares, strict=True) if s}
@@ -85,7 +85,9 @@ def export_mjcf(
         "walk_difference_m": apart,
         "model_difference": dict(whole.difference),
     }
-    return Export({README: readme, **texts, "walk.py": example, **whole.assets}, result)
+    return Export(
+        {README: readme, **texts, "walk.py": example, **alone.assets, **whole.assets}, result
+    )
 
 
 def export_urdf(robot: RobotSpec, title: str = "A robot of antennate") -> Export:
