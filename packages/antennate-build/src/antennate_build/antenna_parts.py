@@ -24,18 +24,18 @@ PRESS = 0.05
 Outline = list[tuple[float, float]]
 
 
-def sector(layout: AntennaLayout, y: tuple[float, float], upto: float) -> Outline:
+def sector(layout: AntennaLayout, hinge: int, y: tuple[float, float], upto: float) -> Outline:
     """Outline of what belongs to the tip side of a hinge at 0, from it to a place along x."""
-    slope, (low, high) = layout.hinge.slope, y
+    slope, (low, high) = layout.slope(hinge), y
     above = [(high * slope, high)] * (high > 0)
     return [(0.0, 0.0), *above, (upto, high), (upto, low), (-low * slope, low)]
 
 
-def _both(layout: AntennaLayout, low: float, high: float) -> Outline:
-    """Outline between two hinges, from the sector of one to that of the other."""
-    slope, length = layout.hinge.slope, layout.length
-    above = [(high * slope, high), (length - high * slope, high)] * (high > 0)
-    return [(0.0, 0.0), *above, (length, 0.0), (length + low * slope, low), (-low * slope, low)]
+def _both(layout: AntennaLayout, hinge: int, low: float, high: float) -> Outline:
+    """Outline between a hinge and the next, from the sector of one to that of the other."""
+    near, far, length = layout.slope(hinge), layout.slope(hinge + 1), layout.length
+    above = [(high * near, high), (length - high * far, high)] * (high > 0)
+    return [(0.0, 0.0), *above, (length, 0.0), (length + low * far, low), (-low * near, low)]
 
 
 def _levels(low: float, high: float) -> tuple[tuple[float, float], tuple[float, float]]:
@@ -47,24 +47,27 @@ def segment(layout: AntennaLayout, number: int) -> Solid:
     """A segment with a hinge at both ends, or at one if it is the last."""
     last = number == layout.antenna.hinges - 1
     hinge, length = layout.hinge, layout.length
-    plates = _end_plates(layout) if last else _plates(layout)
+    plates = _end_plates(layout) if last else _plates(layout, number)
     body = kernel.joined(*plates, *_ties(layout, number, last))
     body = kernel.cut(body, *_clearances(layout, last))
     arms = _arms(layout, 0.0, _levels(hinge.cavity, hinge.inner))
-    arms += [_neck(layout, z, near=True) for z in _levels(hinge.cavity, hinge.inner)]
+    arms += [_neck(layout, number, z, near=True) for z in _levels(hinge.cavity, hinge.inner)]
     if not last:
         arms += _arms(layout, length, _levels(hinge.gap, hinge.half))
-        arms += [_neck(layout, z, near=False) for z in _levels(hinge.gap, hinge.half)]
+        arms += [_neck(layout, number + 1, z, near=False) for z in _levels(hinge.gap, hinge.half)]
     posts = _posts(layout) if number < layout.sensed else []
     whole = kernel.joined(body, *arms, *posts)
     return kernel.cut(whole, *_holes(layout, number, last))
 
 
-def _plates(layout: AntennaLayout) -> list[Solid]:
+def _plates(layout: AntennaLayout, number: int) -> list[Solid]:
     """Plates along both sides, and what joins them to the inner arms."""
     hinge = layout.hinge
-    outline, reach = _both(layout, layout.low, layout.high), hinge.clear + layout.print.wall_mm
-    near = sector(layout, (layout.low, hinge.lug), reach)
+    outline, reach = (
+        _both(layout, number, layout.low, layout.high),
+        hinge.clear + layout.print.wall_mm,
+    )
+    near = sector(layout, number, (layout.low, hinge.lug), reach)
     plates = [
         kernel.cut(kernel.prism(outline, z), *_windows(layout, layout.length - reach))
         for z in _levels(hinge.gap, hinge.half)
@@ -88,10 +91,10 @@ def _windows(layout: AntennaLayout, end: float) -> list[Solid]:
 def _end_plates(layout: AntennaLayout) -> list[Solid]:
     """The plates of the last segment, with a round nose and a wall across."""
     hinge, length, wall = layout.hinge, layout.length, layout.print.wall_mm
-    radius = -layout.low
+    radius, number = -layout.low, layout.antenna.hinges - 1
     middle = length - radius
-    outline = sector(layout, (layout.low, layout.high), middle)
-    near = sector(layout, (layout.low, hinge.lug), hinge.clear + wall)
+    outline = sector(layout, number, (layout.low, layout.high), middle)
+    near = sector(layout, number, (layout.low, hinge.lug), hinge.clear + wall)
     plates = [
         kernel.cut(kernel.prism(outline, z), *_windows(layout, middle + wall))
         for z in _levels(hinge.gap, hinge.half)
@@ -112,7 +115,9 @@ def _ties(layout: AntennaLayout, number: int, last: bool) -> list[Solid]:
         z = layout.leg_height(number + 1, upper=False)
         ends += [((length - tied, length), (length - held, length), z)]
     lower = (
-        sector(layout, (layout.low, 0.0), layout.length) if last else _both(layout, layout.low, 0.0)
+        sector(layout, number, (layout.low, 0.0), layout.length)
+        if last
+        else _both(layout, number, layout.low, 0.0)
     )
     floor = kernel.common(
         kernel.prism(lower, (-hinge.gap, hinge.gap)),
@@ -150,11 +155,11 @@ def _clearances(layout: AntennaLayout, last: bool) -> list[Solid]:
     return [kernel.rod(hinge.clear, (x, 0, -50), 100) for x in ends]
 
 
-def _neck(layout: AntennaLayout, z: tuple[float, float], near: bool) -> Solid:
+def _neck(layout: AntennaLayout, number: int, z: tuple[float, float], near: bool) -> Solid:
     """What joins an arm to its plate: the sector of the segment, as broad as the arm."""
     hinge, lug = layout.hinge, layout.hinge.lug
     reach = hinge.clear + layout.print.wall_mm
-    outline = sector(layout, (-lug, lug), reach)
+    outline = sector(layout, number, (-lug, lug), reach)
     if not near:
         outline = [(layout.length - x, y) for x, y in outline]
     return kernel.prism(outline, z)
@@ -271,19 +276,19 @@ def posts_of_bracket(layout: AntennaLayout, mount: Mount) -> tuple[float, float]
 def _fork(layout: AntennaLayout, mount: Mount) -> Solid:
     """Outer arms about the first hinge, a column behind them, and posts for the sensor."""
     hinge, lug, (back, front) = layout.hinge, layout.hinge.lug, _column(layout, mount)
-    mirrored = [(-px, py) for px, py in sector(layout, (-lug, lug), -front)]
+    mirrored = [(-px, py) for px, py in sector(layout, 0, (-lug, lug), -front)]
     arms = [kernel.prism(mirrored, z) for z in _levels(hinge.gap, hinge.half)]
     arms += _arms(layout, 0.0, _levels(hinge.gap, hinge.half))
     wall = layout.print.wall_mm
     column = kernel.block((back, front), (layout.low, lug), (-hinge.half, hinge.half))
     hollow = (layout.low + wall, lug - wall)
     column = kernel.cut(column, kernel.block((back + wall, 0), hollow, (-hinge.gap, hinge.gap)))
-    stop = [(-px, py) for px, py in sector(layout, (layout.low, layout.high), -front)]
+    stop = [(-px, py) for px, py in sector(layout, 0, (layout.low, layout.high), -front)]
     stops = [kernel.prism(stop, z) for z in _levels(hinge.gap, hinge.half)]
     z = layout.leg_height(0, upper=False)
     beam = layout.print.wall_mm + hinge.leg_hole / 2.0
     rib = kernel.block((front, -hinge.clear), (layout.low, beam - hinge.leg), (z - beam, z + beam))
-    lower = [(-px, py) for px, py in sector(layout, (layout.low, 0.0), -front)]
+    lower = [(-px, py) for px, py in sector(layout, 0, (layout.low, 0.0), -front)]
     rib = kernel.common(rib, kernel.prism(lower, (-99, 99)))
     body = kernel.cut(kernel.joined(column, rib, *stops), kernel.rod(hinge.clear, (0, 0, -50), 100))
     held = posts(layout, posts_of_bracket(layout, mount), layout.low)

@@ -133,7 +133,9 @@ def _segment_views(antenna: AntennaSolids, axes: sheet.Axes) -> None:
     above.radius(
         (length, 0, 0), hinge.pin / 2 + 0.025, 40, f"Ø {hinge.pin + antenna_parts.PRESS:.2f}", 14
     )
-    stop, face = math.degrees(hinge.stop), length - layout.high * hinge.slope
+    second = min(1, layout.antenna.hinges - 1)
+    stop = math.degrees(layout.springs[second].stop)
+    face = length - layout.high * layout.slope(second)
     above.note((face, layout.high, 0), (8, 12), f"stop face {90 - stop / 2:.1f}° to the axis")
     above.length(
         (length / 2, layout.low, 0),
@@ -173,6 +175,7 @@ def _section_table(antenna: AntennaSolids, axes: sheet.Axes) -> None:
     narrow = min(s.narrowest for s in layout.springs)
     wide = max(s.widest for s in layout.springs)
     long = max(s.longest for s in layout.springs)
+    stops = sorted({min(s.stop for s in layout.springs), hinge.stop})
     rows = [
         ["fit", "mm"],
         ["pin, arbor of the springs", f"Ø {hinge.pin:.1f}"],
@@ -181,7 +184,7 @@ def _section_table(antenna: AntennaSolids, axes: sheet.Axes) -> None:
         ["room about the pin", f"Ø {2 * hinge.clear:.2f}"],
         ["longest spring at the stop", f"{long:.2f}"],
         ["room between the inner arms", f"{2 * hinge.cavity:.2f}"],
-        ["stops, each way", f"{math.degrees(hinge.stop):.1f}°"],
+        ["stops, each way", " to ".join(f"{math.degrees(stop):.0f}°" for stop in stops)],
     ]
     sheet.table(axes, (210.0, 62.0), "Fits", rows, (56, 22))
 

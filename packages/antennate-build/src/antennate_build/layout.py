@@ -50,7 +50,7 @@ class HingeSizes:
         inner: Half the height to the outside of the inner arms.
         gap: Half the height to the inside of the outer arms.
         half: Half the height of a segment.
-        stop: Largest angle [rad].
+        stop: Largest angle of any of them [rad].
         leg: Offset of the legs from the pin, towards -y.
         leg_hole: Diameter of the holes of legs.
     """
@@ -69,7 +69,7 @@ class HingeSizes:
 
     @property
     def slope(self) -> float:
-        """How far a stop face goes along x for each mm along y."""
+        """How far the flattest stop face goes along x for each mm along y."""
         return math.tan(self.stop / 2.0)
 
 
@@ -120,6 +120,10 @@ class AntennaLayout:
     high: float
     sensed: int
 
+    def slope(self, hinge: int) -> float:
+        """How far the stop faces of a hinge go along x for each mm along y."""
+        return math.tan(self.springs[hinge].stop / 2.0)
+
     def leg_height(self, spring: int, upper: bool) -> float:
         """Place of a leg of a spring along z [mm]."""
         body = self.springs[spring]
@@ -150,7 +154,7 @@ def layout_of(
     Raises:
         ConfigError: Its hinges do not fit: links too short, or stops too far apart.
     """
-    hinge, length = _hinge_sizes(antenna, springs, params), 1e3 * antenna.link_length
+    hinge, length = _hinge_sizes(springs, params), 1e3 * antenna.link_length
     wall, play = params.wall_mm, params.play_mm
     width, thickness, _ = STRIPS[antenna.sensor.kind]
     floor = hinge.lug + play
@@ -166,7 +170,7 @@ def layout_of(
     )
     least = max(hinge.half, strip.half + strip.lip + wall)
     hinge = _heightened(hinge, least)
-    face = (hinge.clear + _FACE) * math.cos(hinge.stop / 2.0)
+    face = (hinge.clear + _FACE) * math.cos(min(s.stop for s in springs) / 2.0)
     low = max(hinge.foot, face)
     high = max(face, hinge.lug)
     layout = AntennaLayout(
@@ -176,10 +180,8 @@ def layout_of(
     return layout
 
 
-def _hinge_sizes(
-    antenna: AntennaSpec, springs: tuple[Spring, ...], params: PrintParams
-) -> HingeSizes:
-    wall, play, stop = params.wall_mm, params.play_mm, antenna.range
+def _hinge_sizes(springs: tuple[Spring, ...], params: PrintParams) -> HingeSizes:
+    wall, play, stop = params.wall_mm, params.play_mm, max(s.stop for s in springs)
     pin = math.floor(10.0 * ARBOR_SHARE * min(s.narrowest for s in springs)) / 10.0
     lug = pin / 2.0 + play + wall
     leg = springs[0].coil / 2.0

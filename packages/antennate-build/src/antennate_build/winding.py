@@ -46,6 +46,10 @@ class WireParams(SpringParams):
     """Wire, mandrels and limits for springs whose legs lie in line."""
 
     unread: ClassVar[tuple[str, ...]] = ("wire_mm", "coil_mm", "wanted_n_mm_per_deg")
+    stop_share: float = number(
+        0.95, "1", "assumed: play of legs and stops; softer plastic needs less", ge=0.3, le=10
+    )
+    """Where stops stand at most: the angle of their hinge over that at which its spring yields."""
     coil_step: float = number(1.0, "1", "assumed: both legs lie along their links", ge=1, le=1)
     """Step of active coils."""
 
@@ -154,10 +158,10 @@ def springs_of(antenna: AntennaSpec, params: WireParams | None = None) -> tuple[
             leg=leg,
             stiffness=float(spring_stiffness(modulus(params), best.wire, best.coil, turns)),
             wanted=k,
-            yields=yield_angle(params, best.wire, best.coil, turns),
-            stop=antenna.range,
+            yields=(yields := yield_angle(params, best.wire, best.coil, turns)),
+            stop=min(most, params.stop_share * yields),
         )
-        for turns, k in zip(best.coils, wanted, strict=True)
+        for turns, k, most in zip(best.coils, wanted, antenna.hinge_ranges, strict=True)
     )
 
 

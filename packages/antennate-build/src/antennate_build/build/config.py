@@ -39,7 +39,15 @@ _READ = {
             f"antenna.{name}"
             for name in (
                 *("active_coils", "three_coil_stiffness_n_mm_per_deg", "length", "radius"),
-                *("link_mass", "base_mass", "range", "base_angle", "roll", "base_spacing"),
+                *(
+                    "link_mass",
+                    "base_mass",
+                    "range",
+                    "ranges",
+                    "base_angle",
+                    "roll",
+                    "base_spacing",
+                ),
                 *("sensor.active_length", "sensor.kind", "sensor.divider_resistance"),
             )
         ),

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field, SerializerFunctionWrapHandler, model_serializer, model_validator
 
 from antennate import checks
 from antennate.params.base import Params, number
@@ -143,6 +143,8 @@ def require_own_curve(sensor: SensorParams, name: str, curve: CurveParams | None
 _Coils = Annotated[float, Field(ge=0.25, le=1000)]
 """Less than a quarter of a turn is no coil spring."""
 
+_Range = Annotated[float, Field(gt=0, lt=3.1)]
+
 N_MM_PER_DEG = 1e-3 * 180.0 / math.pi
 """One N·mm/deg in N·m/rad."""
 MOST_HINGES = 100
@@ -211,6 +213,8 @@ class AntennaSpec(Params):
     """Inertia added per hinge."""
     range: float = number(1.4, "rad", "assumed: neighbouring holders meet", gt=0, lt=3.1)
     """Largest angle of one hinge."""
+    ranges: tuple[_Range, ...] = number((), "rad", "assumed: all `range`, which empty means")
+    """Largest angle of each hinge, base to tip, where they differ; at most `range`."""
     stop_time: float = number(
         0.02, "s", "assumed: that of the engine; a soft stop", gt=1e-5, le=0.1
     )
@@ -248,6 +252,14 @@ class AntennaSpec(Params):
     """Largest torque of the base servo's drive; of its model if not given."""
     sensor: SensorParams = SensorParams()
 
+    @model_serializer(mode="wrap")
+    def _without_what_is_absent(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """An antenna whose hinges have one range is written as before there were more."""
+        table = handler(self)
+        if not self.ranges:
+            table.pop("ranges", None)
+        return table
+
     @model_validator(mode="after")
     def _sensor_fits(self) -> AntennaSpec:
         sensed = self.sensor.active_length
@@ -258,6 +270,18 @@ class AntennaSpec(Params):
             raise ValueError(
                 f"sensor.active_length must be at most the length of {self.length:g} m, found "
                 f"{sensed:g} m"
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _has_a_range_each(self) -> AntennaSpec:
+        if self.ranges and len(self.ranges) != self.hinges:
+            raise ValueError(
+                f"ranges: expected {self.hinges} angles, one a hinge, found {len(self.ranges)}"
+            )
+        if max(self.hinge_ranges) > self.range:
+            raise ValueError(
+                f"ranges: expected at most range, {self.range:g} rad, found {max(self.ranges):g}"
             )
         return self
 
@@ -301,6 +325,11 @@ class AntennaSpec(Params):
     def hinge_names(self) -> tuple[str, ...]:
         """Names of hinges and links, base to tip."""
         return tuple(f"hinge{i}" for i in range(self.hinges))
+
+    @property
+    def hinge_ranges(self) -> tuple[float, ...]:
+        """Largest angle of each hinge, base to tip [rad]."""
+        return self.ranges or (self.range,) * self.hinges
 
     @property
     def link_length(self) -> float:

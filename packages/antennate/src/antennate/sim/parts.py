@@ -98,7 +98,8 @@ def build_antenna(
     actuator.forcerange = [-drive.torque, drive.torque]
 
     parent, where = base, [0.0, 0.0, 0.0]
-    for name, k in zip(params.hinge_names, params.hinge_stiffness(), strict=True):
+    hinges = zip(params.hinge_names, params.hinge_stiffness(), params.hinge_ranges, strict=True)
+    for name, k, most in hinges:
         parent = parent.add_body(name=name, pos=where)
         parent.add_joint(
             name=name,
@@ -108,7 +109,7 @@ def build_antenna(
             damping=params.damping_time * k,
             armature=params.armature,
             limited=mujoco.mjtLimited.mjLIMITED_TRUE,
-            range=[-params.range, params.range],
+            range=[-most, most],
             solref_limit=[params.stop_time, 1.0],
         )
         parent.add_geom(

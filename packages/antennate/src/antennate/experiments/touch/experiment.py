@@ -186,7 +186,7 @@ def _tip_force(config: TouchConfig, profile: str, angle: float) -> float | None:
     load = np.stack([np.zeros_like(force), force], axis=1)
     rest = equilibrium(chain, np.full(len(force), chain.length), load, follower=True)
     bent = rest.angles[:, : antenna.sensed_hinges].sum(axis=1)
-    within = (abs(rest.angles) < antenna.range).all(axis=1) & rest.solved
+    within = (abs(rest.angles) < np.array(antenna.hinge_ranges)).all(axis=1) & rest.solved
     enough = np.flatnonzero(bent >= angle)
     if not len(enough) or not within[: enough[0] + 1].all():
         return None

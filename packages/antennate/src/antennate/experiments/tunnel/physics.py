@@ -309,7 +309,8 @@ class TrialMonitor:
             return SpringLoad()
         antenna, right = world.robot.antenna, world.robot.right_antenna
         angles = np.frombuffer(self._bends).reshape(-1, hinges)
-        held = np.clip(angles, -antenna.range, antenna.range)
+        most = np.array(antenna.hinge_ranges + right.hinge_ranges)
+        held = np.clip(angles, -most, most)
         return largest_load(held, antenna.spring_stiffness() + right.spring_stiffness())
 
     def result(self, world: Watched) -> TrialResult:
