@@ -123,6 +123,14 @@ class AntennaSolids:
             )
         return parts
 
+    def moving(self, number: int) -> list[Solid]:
+        """What turns with a hinge, straight, in its frame."""
+        parts = [self.printed[self.names[number]], self.printed["pin"]]
+        if number < self.layout.sensed:
+            half = self.layout.length / 2.0
+            parts.append(kernel.moved(self.printed["cover"], (half, 0.0, 0.0)))
+        return parts
+
     def hung(self, side: int, heading: float) -> list[Placed]:
         """All printed parts of an antenna of a robot, straight, in the frame of its base.
 

@@ -14,11 +14,8 @@ from antennate.params.spring import SpringParams
 from antennate.robots.parts import bought
 from antennate.robots.spec import RobotSpec
 from antennate.studies.formats import to_csv
-from antennate_build import flange
-from antennate_build.antenna_assembly import AntennaSolids
+from antennate_build.fasteners import Fastener
 from antennate_build.layout import STRIPS, AntennaLayout
-from antennate_build.link_parts import HEAD_BOLTS
-from antennate_build.robot_assembly import RobotSolids
 from antennate_build.winding import Spring, set_of
 
 WIRE_NAMES = {
@@ -119,43 +116,22 @@ def as_csv(items: list[Item]) -> str:
     return to_csv(rows)
 
 
-def antenna_items(antenna: AntennaSolids, antennae: int) -> list[Item]:
-    """What else some antennae take: screws of their brackets, and the sensor of one alone."""
-    layout, mount = antenna.layout, antenna.mount
+def sensor_items(layout: AntennaLayout) -> list[Item]:
+    """The flex sensor of an antenna that is built alone."""
     kind = layout.antenna.sensor.kind
     width, thickness, length = STRIPS[kind]
     what = "flex sensor" if kind == "flex" else "pressure strip"
     known = "Spectra Symbol FS-L-0095-103" if kind == "flex" else "ZD10-100"
-    screws = len(flange.screw_places(mount, layout.antenna.roll))
-    screw = f"{mount.horn.screw.name} x {flange.SCREW_LENGTH:g}"
     size = f"{known}, {width:g} x {thickness:g} x {length:g} mm"
-    alone = [Item(1, what, "along the antenna", size)] if antennae == 1 else []
-    return [*alone, Item(antennae * screws, screw, "bracket to horn", "pan head")]
+    return [Item(1, what, "along the antenna", size)]
 
 
-def link_items(robot: RobotSolids) -> list[Item]:
-    """Screws of the links, bolts of the hinges."""
-    layout, links = robot.layout, robot.layout.robot.links
-    joints, yaw, leg = links - 1, layout.yaw, layout.leg
-    hinged = [yaw, *([layout.pitch] if layout.pitch is not None else [])]
-    horns = joints * sum(2 * mount.horn.holes for mount in hinged) + 2 * links * leg.horn.holes
-    cases = joints * sum(len(mount.sides) for mount in hinged) + joints * len(yaw.sides)
-    cases += 2 * links * len(leg.back)
-    items = [
+def fastener_items(found: list[Fastener]) -> list[Item]:
+    """Screws and bolts."""
+    asked = {0.0: "ISO 4762, ISO 4032"}
+    return [
         Item(
-            horns, f"{leg.horn.screw.name} x 6", "hinges and legs to horns and idlers", "pan head"
-        ),
-        Item(cases, f"{leg.screw.name} x 6", "servos to frames; x 8 through the cabin", "pan head"),
-        Item(4 * joints, "bolt M3 x 10 with nut", "hinges", "ISO 4762, ISO 4032"),
+            each.count, each.name, each.use, asked.get(each.depth, "pan head"), round(each.mass, 3)
+        )
+        for each in found
     ]
-    if robot.base is not None:
-        items += [
-            Item(len(HEAD_BOLTS), "bolt M3 x 10 with nut", "head plate", "ISO 4762, ISO 4032"),
-            Item(
-                2 * len(robot.base.back),
-                f"{robot.base.screw.name} x 6",
-                "base servos to the head plate",
-                "pan head",
-            ),
-        ]
-    return items

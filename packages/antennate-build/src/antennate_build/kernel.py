@@ -145,6 +145,12 @@ def volume(solid: Solid | None) -> float:
     return 0.0 if solid is None else float(solid.volume)
 
 
+def moments(solid: Solid) -> tuple[float, Floats, Floats]:
+    """Volume [mm³], its centre [mm], shape (3,), and its moments about that [mm⁵], shape (3, 3)."""
+    centre = solid.center(bd.CenterOf.MASS)
+    return volume(solid), np.array(tuple(centre)), np.array(solid.matrix_of_inertia)
+
+
 def bounds(solid: Solid) -> tuple[Point, Point]:
     """Least and largest corner."""
     box = solid.bounding_box()
@@ -164,10 +170,10 @@ class Mesh:
     triangles: np.ndarray[Any, np.dtype[np.int64]]
 
 
-def mesh(solid: Solid, tolerance: float = 0.02) -> Mesh:
-    """Triangles that leave the solid by no more than a distance."""
+def mesh(solid: Solid, tolerance: float = 0.02, turn: float = 0.2) -> Mesh:
+    """Triangles that leave the solid by no more than a distance, and turn by no more [rad]."""
     BRepTools.Clean_s(solid.wrapped)  # what measuring left of a coarser mesh has holes
-    points, triangles = solid.tessellate(tolerance, 0.2)
+    points, triangles = solid.tessellate(tolerance, turn)
     return Mesh(np.array([tuple(p) for p in points]), np.array(triangles, dtype=np.int64))
 
 

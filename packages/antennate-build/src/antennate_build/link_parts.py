@@ -21,6 +21,8 @@ HEAD_FRONT = 34.0
 """Front of the head's frame along x [mm]."""
 HEAD_BOLTS = tuple((y, z) for y in (-28.0, -12.0, 12.0, 28.0) for z in (-9.0, 3.0))
 """Places of the bolts of the head plate."""
+BATTERY = (35.0, 72.0, 22.0)
+"""Largest battery along x, y and z [mm]: usual size of three cells of 1.3 to 1.5 Ah (assumed)."""
 _TIE = (4.0, 2.0)
 """Slot of a cable tie [mm]."""
 _PLAY = 0.2
@@ -37,6 +39,14 @@ def servo(mount: Mount) -> Solid:
     return kernel.joined(*shapes)
 
 
+def battery(layout: LinkLayout) -> Solid:
+    """The largest battery, across the floor of the tail behind its yaw servo."""
+    front = min(layout.axis + layout.yaw.y[0] - PLATE - 1.0, 0.0)
+    long, wide, tall = BATTERY
+    low = layout.floor + PLATE
+    return kernel.block((front - long, front), (-wide / 2.0, wide / 2.0), (low, low + tall))
+
+
 def hinge(mount: Mount, reach: float) -> Solid:
     """A hinge: an arm on the horn, one on the idler, a web between them with four bolts."""
     top, horn = mount.horn.top, mount.horn
@@ -49,12 +59,13 @@ def hinge(mount: Mount, reach: float) -> Solid:
     holes = [kernel.rod(BOLT / 2.0, (reach - 1, y, z), PLATE + 2, "x") for y, z in BOLTS]
     holes.append(kernel.rod(4.5, (reach - 1, 0, 0), PLATE + 2, "x"))  # cables
     holes.append(kernel.rod(horn.centre / 2.0, (0, 0, -99), 198))
-    for x, y in _circle(mount):
+    for x, y in circle(mount):
         holes.append(kernel.rod(horn.screw.clearance / 2.0, (x, y, -99), 198))
     return kernel.cut(kernel.joined(web, *shapes), *holes)
 
 
-def _circle(mount: Mount) -> list[tuple[float, float]]:
+def circle(mount: Mount) -> list[tuple[float, float]]:
+    """Places of the holes of a horn about its shaft [mm]."""
     radius = mount.horn.circle / 2.0
     turns = [n * math.tau / mount.horn.holes for n in range(mount.horn.holes)]
     return [(radius * math.cos(turn), radius * math.sin(turn)) for turn in turns]
@@ -138,7 +149,7 @@ def _frame_holes(layout: LinkLayout, first: bool, last: bool) -> list[Solid]:
         for y, z in layout.pitch.sides:
             at = (layout.rear - y, z, layout.floor - 1)
             holes.append(kernel.rod(screw.clearance / 2.0, at, PLATE + 2))
-            holes.append(kernel.rod(screw.head / 2.0 + 0.3, at, 2.0))
+            holes.append(kernel.rod(screw.head / 2.0 + 0.3, at, 1.6))
     if first:
         front = HEAD_FRONT - PLATE - 1
         holes += [kernel.rod(BOLT / 2.0, (front, y, z), PLATE + 2, "x") for y, z in HEAD_BOLTS]
@@ -155,7 +166,7 @@ def leg(layout: LinkLayout) -> Solid:
     off, width = -1e3 * robot.leg_eccentricity, 1e3 * robot.leg_width
     shell = kernel.rod(radius, (0, off, 0), width)
     hollow = kernel.rod(radius - PLATE, (0, off, PLATE + 1.0), width)
-    holes = [kernel.rod(mount.horn.screw.clearance / 2.0, (x, y, -1), 9) for x, y in _circle(mount)]
+    holes = [kernel.rod(mount.horn.screw.clearance / 2.0, (x, y, -1), 9) for x, y in circle(mount)]
     holes.append(kernel.rod(mount.horn.centre / 2.0, (0, 0, -1), 9))
     return kernel.cut(shell, hollow, *holes)
 

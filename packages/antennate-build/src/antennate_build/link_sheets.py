@@ -14,6 +14,7 @@ from antennate_build.sheet import View
 COLOURS = {
     "servo": "#7B838D",
     "hinge": "#CFE0F2",
+    "battery": "#F0C27B",
     "leg": "#CFE8D2",
     "tread": "#5A5A5A",
     "cabin": "#F2D0D0",

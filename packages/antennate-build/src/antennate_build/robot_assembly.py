@@ -82,12 +82,20 @@ class RobotSolids:
             parts.append(("cabin", self.printed["cabin"]))
             parts.append(("head_plate", self.printed["head_plate"]))
             parts += self._bases()
+        if number == last:
+            parts.append(("battery", link_parts.battery(layout)))
         if number < last and layout.pitch is None:
             parts.append(("hinge", kernel.moved(self.printed["hinge"], (layout.rear, 0.0, 0.0))))
         elif number < last and layout.pitch is not None:
             pitch = _upright(link_parts.servo(layout.pitch), layout.pitch, forward=True)
             parts.append(("servo pitch", kernel.moved(pitch, (layout.rear, 0.0, 0.0))))
         return parts
+
+    def bodies(self, number: int) -> list[Named]:
+        """Parts and servos that move with a link, in its frame: what joins it to the one ahead."""
+        joint = self.joint() if number else []
+        away = self.layout.pitch_length
+        return [*self.link(number), *((n, kernel.moved(s, (away, 0.0, 0.0))) for n, s in joint)]
 
     def _bases(self) -> list[Named]:
         """Base servos of the antennae, upside down."""
@@ -185,14 +193,14 @@ def at_head(robot: RobotSolids, antenna: AntennaSolids, turn: float = 0.0) -> li
     return parts
 
 
-def base_check(robot: RobotSolids, antenna: AntennaSolids) -> tuple[Check, str]:
-    """Antennae and head at angles of the base servos, and what limits these; empty if nothing does.
+def base_check(robot: RobotSolids, antenna: AntennaSolids) -> tuple[Check, str, float | None]:
+    """Antennae and head at angles of the base servos, what limits these, and where [rad].
 
     Antennae that lie along the body may meet the leg servos before the limit of their bases.
     """
     limit, head = robot.layout.robot.antennae.limit, robot.link(0)
     good: list[Meeting] = []
-    free, told = limit, ""
+    free, told, least = limit, "", None
     for share in np.linspace(0.0, 1.0, YAWS):
         found = [
             each
@@ -203,15 +211,15 @@ def base_check(robot: RobotSolids, antenna: AntennaSolids) -> tuple[Check, str]:
         ]
         worst = checks.worst(found)
         if worst is not None and worst.volume > checks.LARGEST_OVERLAP and share > 0.0:
-            free = limit * (share - 1.0 / (YAWS - 1))
+            free = least = limit * (share - 1.0 / (YAWS - 1))
             told = (
-                f"Bases: {' and '.join(worst.parts)} meet {worst.where}; the parts are free up to "
-                f"{math.degrees(free):.0f} deg, robot.antennae.limit is {math.degrees(limit):.0f}."
+                f"Bases: {' and '.join(worst.parts)} meet {worst.where}; robot.toml limits them to "
+                f"{math.degrees(free):.0f} deg in place of {math.degrees(limit):.0f}."
             )
             break
         good += found
     name = f"antennae and head, bases up to {math.degrees(free):.0f} deg either way"
-    return checks.judged(name, good), told
+    return checks.judged(name, good), told, least
 
 
 def robot_checks(robot: RobotSolids, tick: Callable[[], object]) -> list[Check]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 from antennate.robots.spec import RobotSpec
 from antennate_build import kernel
@@ -10,8 +11,8 @@ from antennate_build.antenna_assembly import AntennaSolids
 from antennate_build.build.config import BuildConfig
 from antennate_build.build.naming import antenna_of, links_of
 from antennate_build.build.result import Compared
-from antennate_build.mounts import GRAMS
-from antennate_build.robot_assembly import RobotSolids
+from antennate_build.layout import STRIPS
+from antennate_build.weights import STRIP_DENSITY
 
 
 def compared(unit: str, specified: float, built: float) -> Compared:
@@ -51,36 +52,28 @@ def antenna_masses(antenna: AntennaSolids) -> dict[str, Compared]:
     }
 
 
-def robot_masses(
-    spec: RobotSpec,
-    robot: RobotSolids,
-    grams: Mapping[str, float],
-    antennae: Mapping[str, Compared],
-) -> dict[str, Compared]:
-    """Mass of a robot, of a link and of a leg; battery, boards, cables and screws are not built.
+def robot_masses(spec: RobotSpec, built: Mapping[str, Any]) -> dict[str, Compared]:
+    """Mass of a robot, of a link and of a leg, without adapter and emergency stop.
 
     Args:
         spec: The robot.
-        robot: Its links.
-        grams: Mass of each printed part of the links [g].
-        antennae: Masses of its antennae, if it has some.
+        built: What its file says as it is built.
     """
-    servos = sum(GRAMS[name] for name in spec.servo_names)
-    printed = sum(robot.counts[name] * grams[name] for name in robot.counts)
-    pair = 0.0
-    if "antenna's mass" in antennae:
-        pair = spec.antenna_count * antennae["antenna's mass"].built
-    leg = grams["leg"] + grams["tread"]
-    carried = [spec.yaw.servo, *([spec.pitch.servo] if spec.pitch_count else [])]
-    link = 2.0 * GRAMS[spec.legs.servo] + sum(GRAMS[name] for name in carried)
-    link += grams.get("frame", grams["frame_tail"]) + grams["hinge"] + grams.get("hinge_pitch", 0)
+    masses = {body["name"]: 1e3 * body["mass"] for body in built["bodies"]}
+    mean = sum(masses[name] for name in spec.link_names) / spec.links
     return {
-        "robot's mass without battery, boards and cables": compared(
-            "g", 1e3 * spec.mass, servos + printed + pair
-        ),
-        "link between two others": compared("g", 1e3 * spec.link_mass, link),
-        "leg's mass": compared("g", 1e3 * spec.leg_mass, leg),
+        "robot's mass": compared("g", 1e3 * spec.mass, 1e3 * built["mass"]),
+        "link's mass, mean": compared("g", 1e3 * spec.link_mass, mean),
+        "leg's mass": compared("g", 1e3 * spec.leg_mass, masses[spec.leg_names[0]]),
     }
+
+
+def antenna_grams(antenna: AntennaSolids, masses: Mapping[str, Compared]) -> dict[str, float]:
+    """Mean mass of a link of an antenna, with its share of the flex sensor, and of its base [g]."""
+    width, thickness, length = STRIPS[antenna.layout.antenna.sensor.kind]
+    strip = STRIP_DENSITY * width * thickness * length
+    link = masses["antenna link's mass, mean"].built + strip / antenna.hinges
+    return {"link": link, "base": masses["bracket's mass"].built}
 
 
 def apart(config: BuildConfig) -> list[str]:

@@ -15,13 +15,16 @@ from antennate_build import (
     antenna_sheets,
     billing,
     checks,
+    fasteners,
     kernel,
     link_sheets,
     robot_assembly,
+    robot_files,
     steps,
+    weights,
 )
 from antennate_build.antenna_assembly import AntennaSolids
-from antennate_build.build.comparing import antenna_masses, apart, robot_masses
+from antennate_build.build.comparing import antenna_grams, antenna_masses, apart, robot_masses
 from antennate_build.build.config import BuildConfig
 from antennate_build.build.naming import antenna_of, brackets, links_of, sheet_names
 from antennate_build.build.result import (
@@ -52,6 +55,8 @@ class Product:
         masses: What was compared.
         steps: Steps of the assembly, under their titles.
         items: The bill.
+        screws: Its screws and bolts.
+        files: Files with which the robot is simulated as it is built.
         figures: Drawings by name.
         apart: Where it is not what is simulated.
     """
@@ -64,6 +69,8 @@ class Product:
     masses: dict[str, Compared] = field(default_factory=dict)
     steps: dict[str, tuple[str, ...]] = field(default_factory=dict)
     items: list[billing.Item] = field(default_factory=list)
+    screws: list[fasteners.Fastener] = field(default_factory=list)
+    files: dict[str, str | bytes] = field(default_factory=dict)
     figures: dict[str, Figure] = field(default_factory=dict)
     apart: list[str] = field(default_factory=list)
 
@@ -92,6 +99,8 @@ def made(
         robot = RobotSolids(layout, None if found is None else found[1], horn)
         _add_links(product, config, robot, antenna, tick)
     prints, files = _printed(product, config, tick)
+    files |= product.files
+    product.checks.append(fasteners.check(product.screws, product.parts))
     result = BuildResult(
         parts=prints,
         springs=springs,
@@ -137,7 +146,10 @@ def _add_antenna(
     counts = {name: product.counts[name] for name in antenna.printed}
     product.items += billing.printed_items(counts, grams, layout.print.material)
     product.items += billing.spring_items(layout, config.springs, pair)
-    product.items += billing.antenna_items(antenna, pair)
+    product.items += billing.sensor_items(layout) if pair == 1 else []
+    screws = fasteners.of_antenna(antenna, pair)
+    product.items += billing.fastener_items(screws)
+    product.screws += screws
 
 
 def _add_links(
@@ -147,12 +159,14 @@ def _add_links(
     antenna: AntennaSolids | None,
     tick: Callable[[], None],
 ) -> None:
-    whole = robot.whole()
+    whole, masses, limit, stops = robot.whole(), dict[str, float](), None, tuple[float, ...]()
     if antenna is not None:
         whole += robot_assembly.at_head(robot, antenna)
-        check, told = robot_assembly.base_check(robot, antenna)
+        check, told, limit = robot_assembly.base_check(robot, antenna)
         product.checks.append(check)
         product.apart += [told] if told else []
+        stops = tuple(spring.stop for spring in antenna.layout.springs)
+        masses = antenna_grams(antenna, product.masses)
     for name, solid in robot.printed.items():
         product.parts[name] = solid
         product.counts[name] = robot.counts[name]
@@ -162,14 +176,18 @@ def _add_links(
         product.placed[f"{name} {n + 1}"] = solid
     product.checks += robot_assembly.robot_checks(robot, tick)
     grams = {name: config.print.density * kernel.volume(s) for name, s in robot.printed.items()}
-    product.masses = robot_masses(config.robot, robot, grams, product.masses) | product.masses
+    screws = fasteners.of_links(robot)
+    product.items += billing.fastener_items(screws)
+    product.screws += screws
+    values = weights.robot_values(robot, product.screws, masses, limit, stops)
+    product.files |= robot_files.files(robot, antenna, values)
+    product.masses = robot_masses(config.robot, values) | product.masses
     product.steps["Links"] = steps.link_steps(robot.layout, robot.base)
     product.figures |= {
         "link": link_sheets.link_sheet(robot),
         "robot": link_sheets.shaded(whole),
     }
     product.items += billing.printed_items(robot.counts, grams, config.print.material)
-    product.items += billing.link_items(robot)
     product.items += billing.bought_items(config.robot)
 
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 
+from antennate.robots.antenna import BASE
+from antennate.robots.spec import ANTENNA_PREFIXES, RobotSpec
 from antennate_build.build.config import BuildConfig
 from antennate_build.flange import hinge_height
 from antennate_build.layout import AntennaLayout, layout_of, segment_names
@@ -12,6 +14,8 @@ from antennate_build.link_layout import part_names as link_part_names
 from antennate_build.mounts import Mount, mount_of
 from antennate_build.winding import springs_of
 
+MESHES = "meshes"
+"""Folder of the meshes of bodies, beside robot.toml."""
 SHEETS = ("antenna", "assembly", "bracket")
 """Drawings of an antenna."""
 
@@ -68,10 +72,21 @@ def sheet_names(config: BuildConfig) -> tuple[str, ...]:
     return (*SHEETS, *links) if config.robot.antenna_count else links
 
 
+def _robot_files(robot: RobotSpec) -> tuple[str, ...]:
+    """Files with which a robot is simulated as it is built."""
+    antenna = (BASE, *robot.antenna.hinge_names)
+    prefixes = ANTENNA_PREFIXES[: robot.antenna_count]
+    antennae = (prefix + name for prefix in prefixes for name in antenna)
+    bodies = (*robot.link_names, *robot.leg_names, *antennae)
+    return ("robot.toml", "robot.xml", *(f"{MESHES}/{name}.stl" for name in bodies))
+
+
 def file_names(config: BuildConfig) -> tuple[str, ...]:
     """All files beside those that every run has."""
     parts = part_names(config)
+    robot = _robot_files(config.robot) if config.what == "robot" else ()
     return (
+        *robot,
         *(f"stl/{name}.stl" for name in parts),
         *(f"step/{name}.step" for name in parts),
         "step/assembly.step",
