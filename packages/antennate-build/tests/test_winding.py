@@ -27,7 +27,7 @@ LADDERS = [
 
 def test_the_papers_counts_are_wound_of_half_a_millimetre_of_stainless_wire() -> None:
     """193 GPa d^4 / (10.8 D N) per turn, D = 3.8 mm, N = 3: 0.2721 N·mm/deg; the paper: 0.274."""
-    springs = springs_of(AntennaSpec())
+    springs = springs_of(AntennaSpec(), WireParams(wire="stainless_302"))
     assert [spring.turns for spring in springs] == [3, 6, 6, 9, 9, 9]
     assert {(round(s.wire, 3), round(s.coil, 3)) for s in springs} == {(0.5, 3.8)}
     rate = 193e3 * 0.5**4 / (10.8 * 3.8 * 3) / 360
@@ -50,6 +50,19 @@ def test_all_ladders_are_wound_of_stock_wire_and_their_arbor_has_play(
         assert layout.hinge.pin <= 0.9 * inside
         assert abs(spring.error) < 0.1
     assert len(segment_names(layout)) == len(coils)
+
+
+def test_stops_stand_before_the_spring_yields_or_at_the_range() -> None:
+    """Music wire, Shigley: 0.78 x 2211 MPa / 0.5^0.145 at the inside of coils of 4 mm: 78.04."""
+    springs = springs_of(AntennaSpec())
+    assert (springs[0].wire, springs[0].coil) == pytest.approx((0.5, 4.0))
+    assert math.degrees(springs[0].yields) == pytest.approx(78.04, abs=0.01)
+    stops = [spring.stop for spring in springs]
+    assert stops == pytest.approx([math.radians(0.95 * 78.0414), *[1.4] * 5], abs=1e-5)
+    farther = springs_of(AntennaSpec(), WireParams(stop_share=10.0))
+    assert {spring.stop for spring in farther} == {1.4}
+    nearer = springs_of(AntennaSpec(ranges=(1.0, 1.4, 1.4, 1.4, 1.4, 0.5)))
+    assert [nearer[0].stop, nearer[-1].stop] == [1.0, 0.5]
 
 
 def test_loose_legs_make_a_spring_softer_by_a_third_of_their_length() -> None:
@@ -85,7 +98,7 @@ def test_a_servo_without_hole_pattern_is_refused() -> None:
 REFUSED = {
     "no stock wire": (
         "three_coil_stiffness_n_mm_per_deg = 900.0\n",
-        "antenna.active_coils: expected springs that stock stainless_302 gives",
+        "antenna.active_coils: expected springs that stock music_wire gives",
     ),
     "hard to reach": ("length = 0.06\n", "antenna.length: expected at least 0.0"),
     "short link": (
@@ -98,6 +111,10 @@ REFUSED = {
         "robot.yaw.servo: expected a servo with holes",
     ),
     "small leg": ("leg_radius = 0.015\n", "robot.leg_radius: expected a ring"),
+    "unequal ranges": (
+        "active_coils = [3.0, 6.0]\nlength = 0.05\nranges = [1.0]\n",
+        "ranges: expected 2 angles, one a hinge, found 1",
+    ),
     "lifting": ('[legs]\nkind = "lifting"\n', "robot.legs.kind: expected rolling legs"),
 }
 
@@ -115,6 +132,15 @@ def test_what_cannot_be_built_is_refused_in_one_line(
     assert expected in error
     assert error.count("\n") == 1
     assert not (tmp_path / "out").exists()
+
+
+def test_the_hexapod_is_refused_in_one_line_as_its_legs_lift(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["build", "hexapod", "--out", str(tmp_path / "out")]) == 2
+    error = capsys.readouterr().err
+    assert "robot.legs.kind: expected rolling legs, whose links are known, found lifting" in error
+    assert error.count("\n") == 1
 
 
 def test_without_the_kernel_one_line_says_what_to_install(

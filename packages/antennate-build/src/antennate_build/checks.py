@@ -6,18 +6,21 @@ Parts meet where the volume that two of them have in common is above `LARGEST_OV
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
 import trimesh
 
+from antennate.types import Floats
 from antennate_build import kernel, voxels
 from antennate_build.kernel import Solid
 
 LARGEST_OVERLAP = 1.0
 """Volume that two parts may have in common [mm³]: what is left where faces touch."""
+SMALLEST_BED = 3.0
+"""Smallest first layer that stays on the bed, with a brim [mm²] (assumed)."""
 CUBE = 0.1
 """Edge of the cubes by which walls and overhangs of a small part are judged [mm]."""
 _MOST_CUBES = 6e6
@@ -51,6 +54,7 @@ class Print:
         wall: Thinnest wall [mm], no more than what is asked for.
         thin: A place in it, in words; empty where nothing is thinner than asked for.
         overhangs: What needs support.
+        layers: Area of its layers from the bed up [mm²].
     """
 
     solid: Solid
@@ -59,6 +63,7 @@ class Print:
     wall: float
     thin: str
     overhangs: tuple[voxels.Overhang, ...]
+    layers: Floats
 
 
 def upright(solid: Solid, up: Up) -> Solid:
@@ -97,7 +102,20 @@ def printed(solid: Solid, up: Up, wall: float, tolerance: float = 0.02) -> Print
         least,
         where,
         tuple(voxels.overhangs(cubes)),
+        voxels.layers(cubes),
     )
+
+
+def layers_check(prints: Mapping[str, Print]) -> Check:
+    """The check that each part keeps to the bed, and has material in each of its layers."""
+    bed, name = min((float(part.layers[0]), name) for name, part in prints.items())
+    least, other = min((float(part.layers.min()), name) for name, part in prints.items())
+    loose = [
+        name for name, part in prints.items() if any(math.isinf(o.reach) for o in part.overhangs)
+    ]
+    told = f"smallest first layer {bed:.0f} mm² ({name}), smallest of all {least:.1f} ({other})"
+    told += f"; begin in the air: {', '.join(loose)}" if loose else "; none begins in the air"
+    return Check("layers", told, bed >= SMALLEST_BED and least > 0.0)
 
 
 def stl(mesh: kernel.Mesh) -> bytes:
@@ -108,7 +126,15 @@ def stl(mesh: kernel.Mesh) -> bytes:
 
 def overlap(one: Solid, other: Solid) -> float:
     """Volume that two solids have in common [mm³]; boxes about them are compared first."""
-    (low, high), (below, above) = kernel.bounds(one), kernel.bounds(other)
+    return _overlap(one, kernel.bounds(one), other, kernel.bounds(other))
+
+
+Box = tuple[kernel.Point, kernel.Point]
+
+
+def _overlap(one: Solid, box: Box, other: Solid, next_box: Box) -> float:
+    """The same with their boxes, which take long to find."""
+    (low, high), (below, above) = box, next_box
     apart = any(a > d or c > b for a, b, c, d in zip(low, high, below, above, strict=True))
     return 0.0 if apart else kernel.volume(kernel.common(one, other))
 
@@ -138,9 +164,11 @@ Named = tuple[str, Solid]
 
 def between(still: Sequence[Named], moving: Sequence[Named], where: str) -> Iterator[Meeting]:
     """Overlaps of parts of two bodies."""
+    boxes = [kernel.bounds(body) for _, body in moving]
     for name, solid in still:
-        for other, body in moving:
-            yield Meeting(overlap(solid, body), (name, other), where)
+        box = kernel.bounds(solid)
+        for (other, body), its in zip(moving, boxes, strict=True):
+            yield Meeting(_overlap(solid, box, body, its), (name, other), where)
 
 
 def judged(name: str, meetings: Sequence[Meeting]) -> Check:

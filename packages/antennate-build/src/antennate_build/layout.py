@@ -13,7 +13,7 @@ their flat faces exactly at the stop, and what is in one sector never meets the 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from antennate.errors import ConfigError
 from antennate.robots.antenna import AntennaSpec
@@ -23,8 +23,9 @@ from antennate_build.winding import ARBOR_SHARE, LEG_ROOM, Spring
 STRIPS = {"flex": (6.35, 0.43, 112.2), "fsr": (10.2, 0.30, 120.0)}
 """Width, thickness and whole length of the sensor [mm]: Spectra Symbol FS-L-0095-103 and
 ZD10-100, a pressure strip (assumed: not looked up; measure yours before you print)."""
-_FACE = 0.7
-"""Shortest stop face, seen along the pin [mm] (assumed: nearly two lines)."""
+_FACE, _LEAST_FACE = 0.7, 0.5
+"""Shortest stop face, seen along the pin, and that of the nearest stops towards the bed [mm]
+(assumed: nearly two lines, and more than one)."""
 FOOT = 0.7
 """Half the width of the foot on which an arm stands while it is printed [mm]."""
 _LIP = 0.6
@@ -170,9 +171,9 @@ def layout_of(
     )
     least = max(hinge.half, strip.half + strip.lip + wall)
     hinge = _heightened(hinge, least)
-    face = (hinge.clear + _FACE) * math.cos(min(s.stop for s in springs) / 2.0)
-    low = max(hinge.foot, face)
-    high = max(face, hinge.lug)
+    far, near = (math.cos(turn / 2.0) for turn in (hinge.stop, min(s.stop for s in springs)))
+    low = max(hinge.foot, (hinge.clear + _FACE) * far, (hinge.clear + _LEAST_FACE) * near)
+    high = max((hinge.clear + _FACE) * near, hinge.lug)
     layout = AntennaLayout(
         antenna, params, springs, hinge, strip, length, -low, high, antenna.sensed_hinges
     )
@@ -182,7 +183,8 @@ def layout_of(
 
 def _hinge_sizes(springs: tuple[Spring, ...], params: PrintParams) -> HingeSizes:
     wall, play, stop = params.wall_mm, params.play_mm, max(s.stop for s in springs)
-    pin = math.floor(10.0 * ARBOR_SHARE * min(s.narrowest for s in springs)) / 10.0
+    narrowest = min(replace(s, stop=stop).narrowest for s in springs)  # hands bend one farther
+    pin = math.floor(10.0 * ARBOR_SHARE * narrowest) / 10.0
     lug = pin / 2.0 + play + wall
     leg = springs[0].coil / 2.0
     hidden = (leg + springs[0].wire / 2.0 + play) / math.cos(stop / 2.0)

@@ -79,12 +79,12 @@ def link_sheet(robot: RobotSolids) -> Figure:
         f"{2 * layout.wall:g} between leg servos",
     )
     oblique = View(axes, (305.0, 195.0), 0.55, (0.55, -0.6, 0.6), (0.0, 0.0, 1.0))
-    oblique.scene([(solid, colour(name)) for name, solid in parts])
+    oblique.scene([(solid, colour(name)) for name, solid in parts], 5.0)
     return figure
 
 
 def shaded(parts: list[Named]) -> Figure:
     """The robot as one sees it, straight."""
     view, figure = sheet.picture(9.0, 5.0, ((0.55, 0.6, 0.6), (0.0, 0.0, 1.0)))
-    view.scene([(solid, colour(name)) for name, solid in parts])
+    view.scene([(solid, colour(name)) for name, solid in parts], 9.0)
     return figure

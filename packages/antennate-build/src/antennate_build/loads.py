@@ -25,7 +25,7 @@ MAIN_LINE = 0.026
 """Of two wires of 1 mm² with their insulation [g/mm] (copper 8.96 g/cm³, half as much around)."""
 SOURCES = (
     "mass, leg_mass, bodies: printed parts solid, by density; servos by ROBOTIS' e-manual;",
-    f"  battery {BATTERY_GRAMS:g} g/Ah, as a buyer weighed packs; screws as steel cylinders; assumed:",
+    f"  battery {BATTERY_GRAMS:g} g/Ah, as a buyer weighed packs; screws as cylinders; assumed:",
     f"  ESP32 board {GRAMS['board']:g} g, converter {GRAMS['converter']:g} g, cable with plugs "
     f"{GRAMS['cable']:g} g, feed {GRAMS['feed']:g} g,",
     f"  fuse {GRAMS['fuse']:g} g, main line {1e3 * MAIN_LINE:g} g/m;",

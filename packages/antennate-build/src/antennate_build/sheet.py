@@ -185,7 +185,10 @@ class View:
             solid: The solid.
             most: Longest edge of a triangle [mm]: large ones have no nearness of their own.
         """
-        mesh, eye = kernel.mesh(solid, 0.1), np.array(self.eye) / np.linalg.norm(self.eye)
+        mesh, eye = (
+            kernel.mesh(solid, most / 30.0 if most < math.inf else 0.1),
+            np.array(self.eye) / np.linalg.norm(self.eye),
+        )
         corners = mesh.points[mesh.triangles]
         if math.isfinite(most):
             points, triangles = subdivide_to_size(mesh.points, mesh.triangles, most, 20)[:2]
@@ -199,9 +202,14 @@ class View:
         bright = 0.62 + 0.38 * np.clip(normals @ (light / np.linalg.norm(light)), 0.0, 1.0)
         return flat, (corners @ eye).mean(axis=1), bright
 
-    def scene(self, parts: Sequence[tuple[Solid, str]]) -> None:
-        """Draw coloured solids, shaded and with edges, what is near over what is far."""
-        found = [(*self._front(solid, 3.0), to_rgb(colour)) for solid, colour in parts]
+    def scene(self, parts: Sequence[tuple[Solid, str]], most: float = 3.0) -> None:
+        """Draw coloured solids, shaded and with edges, what is near over what is far.
+
+        Args:
+            parts: Solids and their colours.
+            most: Longest edge of a triangle [mm]; the picture takes a while if it is short.
+        """
+        found = [(*self._front(solid, most), to_rgb(colour)) for solid, colour in parts]
         flat = np.concatenate([each[0] for each in found])
         order = np.argsort(np.concatenate([each[1] for each in found]))
         colours = np.concatenate([each[2][:, None] * np.array(each[3]) for each in found])

@@ -128,9 +128,10 @@ def robot_values(
     if antenna:
         link, base = (round(1e-3 * antenna[name], 7) for name in ("link", "base"))
         total += spec.antenna_count * (spec.antenna.hinges * link + base)
-        values["antenna"] = {"link_mass": link, "base_mass": base}
+        said: dict[str, Any] = {"link_mass": link, "base_mass": base}
+        values["antenna"] = said
         if any(not math.isclose(stop, spec.antenna.range) for stop in stops):
-            values["antenna"]["ranges"] = [math.floor(1e4 * stop) / 1e4 for stop in stops]
+            said["ranges"] = [math.floor(1e4 * stop) / 1e4 for stop in stops]
         if limit is not None:
             values["antennae"] = {"limit": math.floor(1e4 * limit) / 1e4}
     return values | {"mass": total}

@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import ClassVar
+from typing import ClassVar, Literal
 
 from antennate.antenna.springs import Winding, spring_stiffness, windings, yield_angle
 from antennate.antenna.springs import modulus_of as modulus
@@ -46,6 +46,10 @@ class WireParams(SpringParams):
     """Wire, mandrels and limits for springs whose legs lie in line."""
 
     unread: ClassVar[tuple[str, ...]] = ("wire_mm", "coil_mm", "wanted_n_mm_per_deg")
+    wire: Literal["stainless_302", "music_wire", "hard_drawn", "phosphor_bronze"] = number(
+        "music_wire", "1", "assumed: shops for models have it, and it yields last; oil it"
+    )
+    """Kind of wire."""
     stop_share: float = number(
         0.95, "1", "assumed: play of legs and stops; softer plastic needs less", ge=0.3, le=10
     )

@@ -222,8 +222,10 @@ def _printed(
     """Each part as it is printed, and its files; the check that all meshes are closed."""
     found: dict[str, PartMade] = {}
     files: dict[str, str | bytes] = {}
+    prints: dict[str, checks.Print] = {}
     for name, solid in product.parts.items():
         part = checks.printed(solid, product.ups[name], config.print.wall_mm)
+        prints[name] = part
         low, high = kernel.bounds(part.solid)
         found[name] = PartMade(
             count=product.counts[name],
@@ -242,6 +244,7 @@ def _printed(
     holes = [name for name, part in found.items() if not part.closed]
     told = f"open: {', '.join(holes)}" if holes else f"{len(found)} meshes, each one closed body"
     product.checks.append(Check("meshes", told, not holes))
+    product.checks.append(checks.layers_check(prints))
     return found, files
 
 
