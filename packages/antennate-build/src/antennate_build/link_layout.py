@@ -25,6 +25,8 @@ _LEG_ROOM = 2.0
 CABIN = (64.0, 56.0, 18.0)
 """Inside of the cabin along x and y, and its height [mm]: an ESP32 board of 55 x 28 (ESP32-DevKitC,
 Espressif), beside it a step-down converter of up to 51 x 22 [assumed]."""
+BATTERY = (35.0, 72.0, 22.0)
+"""Largest battery along x, y and z [mm]: usual size of three cells of 1.3 to 1.5 Ah (assumed)."""
 TREAD = 1.5
 """Thickness of the tread of a leg [mm] (assumed: a ring of soft plastic, or of rubber)."""
 

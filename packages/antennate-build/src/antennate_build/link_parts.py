@@ -10,7 +10,7 @@ import math
 
 from antennate_build import kernel
 from antennate_build.kernel import Solid
-from antennate_build.link_layout import CABIN, PLATE, TREAD, LinkLayout
+from antennate_build.link_layout import BATTERY, CABIN, PLATE, TREAD, LinkLayout
 from antennate_build.mounts import Mount
 
 BOLT = 3.2
@@ -21,8 +21,6 @@ HEAD_FRONT = 34.0
 """Front of the head's frame along x [mm]."""
 HEAD_BOLTS = tuple((y, z) for y in (-28.0, -12.0, 12.0, 28.0) for z in (-9.0, 3.0))
 """Places of the bolts of the head plate."""
-BATTERY = (35.0, 72.0, 22.0)
-"""Largest battery along x, y and z [mm]: usual size of three cells of 1.3 to 1.5 Ah (assumed)."""
 _TIE = (4.0, 2.0)
 """Slot of a cable tie [mm]."""
 _PLAY = 0.2

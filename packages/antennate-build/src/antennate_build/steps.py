@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from antennate_build import flange
 from antennate_build.layout import STRIPS, AntennaLayout
-from antennate_build.link_layout import LinkLayout
+from antennate_build.link_layout import BATTERY, LinkLayout
 from antennate_build.mounts import Mount
 
 
@@ -41,7 +41,7 @@ def antenna_steps(layout: AntennaLayout, mount: Mount) -> tuple[str, ...]:
 
 def link_steps(layout: LinkLayout, base: Mount | None) -> tuple[str, ...]:
     """Steps from printed frames and servos to a robot, tail first."""
-    robot, leg = layout.robot, layout.leg
+    robot, leg, size = layout.robot, layout.leg, " x ".join(f"{edge:g}" for edge in BATTERY)
     joint = (
         "bolt a hinge to the rear wall of the link ahead with four M3 x 10"
         if layout.pitch is None
@@ -76,6 +76,8 @@ def link_steps(layout: LinkLayout, base: Mount | None) -> tuple[str, ...]:
         f"At each joint {joint}; then screw the arms of the hinge to horn and idler of the yaw "
         "servo behind.",
         "Pull a tread over each leg and screw the leg onto its horn; all rings point down at zero.",
+        f"Lay the battery, at most {size} mm, across the floor of the tail behind its yaw servo; a "
+        "cable tie through the slots at both sides holds it and the fuse.",
         "Lead the cables along the floor through the holes of the hinges, with a loop at each "
         "joint, and tie them at the slots.",
         *head,

@@ -134,4 +134,4 @@ def robot_values(
             said["ranges"] = [math.floor(1e4 * stop) / 1e4 for stop in stops]
         if limit is not None:
             values["antennae"] = {"limit": math.floor(1e4 * limit) / 1e4}
-    return values | {"mass": total}
+    return values | {"mass": round(total, 7)}
