@@ -256,8 +256,8 @@ class AntennaSpec(Params):
     def _without_what_is_absent(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
         """An antenna whose hinges have one range is written as before there were more."""
         table = handler(self)
-        if not self.ranges:
-            table.pop("ranges", None)
+        if not table.get("ranges", True):
+            del table["ranges"]
         return table
 
     @model_validator(mode="after")

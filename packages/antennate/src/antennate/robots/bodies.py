@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from typing import Annotated
+
 import numpy as np
-from pydantic import model_validator
+from pydantic import Field, model_validator
 
 from antennate.params.base import Params, number
 
 _LEAST = 1e-9
 """Least moment of inertia about an axis [kg·m²]."""
+
+_Place = Annotated[float, Field(ge=-10, le=10)]
 
 
 class BodyParams(Params):
@@ -22,7 +26,7 @@ class BodyParams(Params):
     """Name of the link or leg, such as link0 or leg_l0."""
     mass: float = number(0.1, "kg", "assumed: has to be given", gt=0)
     """Its mass."""
-    centre: tuple[float, float, float] = number((0.0, 0.0, 0.0), "m", "assumed: has to be given")
+    centre: tuple[_Place, _Place, _Place] = number((0.0, 0.0, 0.0), "m", "assumed: has to be given")
     """Its centre of mass."""
     inertia: tuple[float, float, float, float, float, float] = number(
         (1e-4, 1e-4, 1e-4, 0.0, 0.0, 0.0), "kg·m²", "assumed: has to be given"

@@ -184,8 +184,8 @@ class RobotSpec(Params):
         if self.imu == ImuParams():
             table.pop("imu", None)
         for name in ("fitted", "bodies", "meshes"):
-            if not getattr(self, name):
-                table.pop(name, None)
+            if not table.get(name, True):
+                del table[name]
         return table
 
     @property
