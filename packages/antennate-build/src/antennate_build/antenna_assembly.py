@@ -6,14 +6,11 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal
 
 from antennate_build import antenna_parts, kernel
 from antennate_build.kernel import Point, Solid
 from antennate_build.layout import AntennaLayout, segment_names
 from antennate_build.mounts import Mount
-
-Kind = Literal["printed", "bought"]
 
 
 @dataclass(frozen=True)
@@ -24,13 +21,11 @@ class Placed:
         name: Its name, with a number where there are several.
         part: The part that it is one of.
         solid: The solid, in the frame of the assembly.
-        kind: Whether it is printed.
     """
 
     name: str
     part: str
     solid: Solid
-    kind: Kind
 
 
 @dataclass(frozen=True)
@@ -104,7 +99,7 @@ class AntennaSolids:
         bracket, turn = self.standing
         solid = self.printed[bracket]
         solid = kernel.turned(solid, -turn, "x") if turn else solid
-        parts = [Placed(bracket, bracket, solid, "printed")]
+        parts = [Placed(bracket, bracket, solid)]
         middle = antenna_parts.posts_of_bracket(self.layout, self.mount)
         parts.append(self._cover(1, (sum(middle) / 2.0, 0.0, 0.0), (0.0, 0.0), 0.0))
         at, heading = (0.0, 0.0), 0.0
@@ -147,7 +142,7 @@ class AntennaSolids:
             solid = self.printed[name] if own else kernel.turned(part.solid, turn, "x")
             over = kernel.turned(solid, math.pi, "x")
             put = kernel.turned(over, heading)
-            found.append(Placed(part.name, name if own else part.part, put, part.kind))
+            found.append(Placed(part.name, name if own else part.part, put))
         return found
 
     def _cover(self, number: int, place: Point, at: tuple[float, float], heading: float) -> Placed:
@@ -158,4 +153,4 @@ class AntennaSolids:
         self, name: str, part: str, solid: Solid, at: tuple[float, float], heading: float
     ) -> Placed:
         put = kernel.moved(kernel.turned(solid, heading) if heading else solid, (*at, 0.0))
-        return Placed(name, part, put, "bought" if part == "spring" else "printed")
+        return Placed(name, part, put)

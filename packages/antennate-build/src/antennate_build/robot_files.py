@@ -16,8 +16,8 @@ from antennate_build import checks, kernel
 from antennate_build.antenna_assembly import AntennaSolids
 from antennate_build.build.naming import MESHES
 from antennate_build.kernel import Solid
-from antennate_build.loads import SOURCES
 from antennate_build.robot_assembly import RobotSolids
+from antennate_build.weights import SOURCES
 
 _PERIOD = 0.01
 """Time between two commands [s]: 100 Hz, as all commands have it unless told otherwise."""

@@ -30,16 +30,13 @@ def antenna_masses(antenna: AntennaSolids) -> dict[str, Compared]:
     grams = {name: density * kernel.volume(solid) for name, solid in antenna.printed.items()}
     bracket = grams[antenna.sides[0][0]] + grams["cover"]
     links, inertia = [], 0.0
-    for n, name in enumerate(antenna.names):
-        link = grams[name] + grams["pin"] + layout.springs[n].mass
-        middle = layout.length * (n + 0.5)
-        at_pin = grams["pin"] + layout.springs[n].mass
-        inertia += grams[name] * (middle**2 + layout.length**2 / 12.0)
-        inertia += at_pin * (layout.length * n) ** 2
-        if n < layout.sensed:
-            link += grams["cover"]
-            inertia += grams["cover"] * middle**2
-        links.append(link)
+    for n, spring in enumerate(layout.springs):
+        found = [kernel.moments(solid) for solid in antenna.moving(n)]
+        links.append(spring.mass + density * sum(volume for volume, _, _ in found))
+        inertia += spring.mass * (layout.length * n) ** 2
+        for volume, (x, y, _), own in found:
+            apart = (layout.length * n + x) ** 2 + y**2
+            inertia += density * (float(own[2, 2]) + volume * apart)
     rods = sum(
         1e3 * spec.link_mass * ((layout.length * (n + 0.5)) ** 2 + layout.length**2 / 12.0)
         for n in range(spec.hinges)
@@ -48,7 +45,7 @@ def antenna_masses(antenna: AntennaSolids) -> dict[str, Compared]:
         "antenna's mass": compared("g", 1e3 * spec.mass, sum(links) + bracket),
         "antenna link's mass, mean": compared("g", 1e3 * spec.link_mass, sum(links) / len(links)),
         "bracket's mass": compared("g", 1e3 * spec.base_mass, bracket),
-        "antenna's inertia about its base": compared("g·mm²", rods, inertia),
+        "antenna's inertia about its base": compared("g·mm²", rods, float(inertia)),
     }
 
 
