@@ -9,12 +9,14 @@ import numpy as np
 import pytest
 
 from antennate.cli import main
+from antennate.errors import ConfigError
 from antennate.params.scene import PhysicsParams
+from antennate.robots.antenna import AntennaSpec
 from antennate.robots.mechanics import body_of
 from antennate.robots.spec import RobotSpec
 from antennate.sim.engine import mujoco
 from antennate.sim.export.folder import export_mjcf
-from antennate.sim.parts import OBSTACLE_BIT
+from antennate.sim.parts import OBSTACLE_BIT, build_antenna
 from antennate.sim.world import World, compile_world
 from antennate.testing import check_robot
 
@@ -124,6 +126,16 @@ def test_a_file_that_is_no_robot_is_refused_in_one_line(
     error = capsys.readouterr().err
     assert expected in error
     assert error.count("\n") == 1
+
+
+def test_hinges_of_an_antenna_stop_where_its_file_says() -> None:
+    stops = (1.2, 1.4, 1.3, 1.4, 1.4, 0.9)
+    model = build_antenna(AntennaSpec(ranges=stops)).compile()
+    found = [model.joint(f"hinge{n}").range.tolist() for n in range(6)]
+    assert found == [pytest.approx([-stop, stop]) for stop in stops]
+    assert AntennaSpec().hinge_ranges == (1.4,) * 6
+    with pytest.raises(ConfigError, match=r"ranges: expected at most range, 1.4 rad, found 1.5"):
+        AntennaSpec(ranges=(1.5,) * 6)
 
 
 def test_a_robot_without_bodies_is_written_as_before() -> None:

@@ -160,7 +160,6 @@ def build_robot(params: RobotSpec) -> mujoco.MjSpec:
     for body in params.bodies:
         part = spec.body(body.name)
         part.mass, part.ipos, part.fullinertia = body.mass, body.centre, body.inertia
-        part.explicitinertial = True
     if params.meshes:
         add_meshes(spec, Path(params.meshes))
     return spec
