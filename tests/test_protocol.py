@@ -168,6 +168,16 @@ def test_bad_file_is_refused_in_one_line(
     monkeypatch.chdir(tmp_path)
     (tmp_path / "short.toml").write_text(text)
     assert words in refused("drive", "--protocol", "short.toml")
+
+
+def test_a_vice_is_refused_where_a_twin_hangs_by_its_hook(
+    tmp_path: Path, refused: Callable[..., str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    step = '[[steps]]\nplace = "hanging"\njoint = "yaw1"\n'
+    (tmp_path / "short.toml").write_text(f"{step}[hook]\nfirm = true\n")
+    line = refused("drive", "--protocol", "short.toml", "--tell", "orders")
+    assert "hook: expected the hook of the twin beside --tell" in line
     assert [path.name for path in tmp_path.iterdir()] == ["short.toml"]
 
 

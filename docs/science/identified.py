@@ -40,7 +40,7 @@ from antennate_lab.fit import measures
 from antennate_lab.fit.config import FitConfig
 from antennate_lab.fit.parameters import parameters
 from antennate_lab.fit.run import run
-from antennate_lab.fit.simulated import PHYSICS, Course, command, simulated, world_of
+from antennate_lab.fit.simulated import PHYSICS, Course, commands, simulated, world_of
 from dynamixel_bus.model import POSITION_UNIT
 
 JUDGED = 60601
@@ -84,10 +84,11 @@ def _ticks(robot: RobotSpec, protocol: Protocol, rng: np.random.Generator) -> It
     for hanging in (True, False):
         steps = [step for step in protocol.steps if (step.place == "hanging") == hanging]
         sim = SimRobot(1, robot, period, PHYSICS.timestep)
-        sim.load(0, world_of(robot, hanging), chance)
-        for at, (angles, events) in enumerate(_courses(steps, robot), 1):
+        rest = np.zeros(len(robot.joint_names))
+        sim.load(0, world_of(robot, protocol.hook if hanging else None, rest), chance)
+        for at, (angles, events) in enumerate(_courses(steps, robot, protocol.carry), 1):
             frame, number = sim.read(), number + 1
-            sim.write(command(robot, angles))
+            sim.write(next(commands(robot, angles[None])))
             sim.sleep_until(at * period)
             yield Tick(
                 number=number,
@@ -111,9 +112,13 @@ def _ticks(robot: RobotSpec, protocol: Protocol, rng: np.random.Generator) -> It
             )
 
 
-def _courses(steps: list[Step], robot: RobotSpec) -> Iterator[tuple[Floats, tuple[str, ...]]]:
-    """Joint targets of each tick, and what begins or ends with it."""
+def _courses(
+    steps: list[Step], robot: RobotSpec, carry: float
+) -> Iterator[tuple[Floats, tuple[str, ...]]]:
+    """Joint targets of each tick, and what begins or ends with it; first it is carried there."""
     last, after = np.zeros(len(robot.joint_names)), ()
+    for _ in range(round(carry / CONTROL.period)):
+        yield last, after
     for step in steps:
         wanted = targets(step, robot, CONTROL)
         for angles in lead(last, wanted[0], robot, CONTROL.period, 1.0):

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import importlib.util
+import itertools
 import math
+import re
 import tomllib
 from collections.abc import Callable
 from dataclasses import replace
@@ -18,6 +20,7 @@ from scipy import signal
 from antennate.control.protocol import Protocol, Step
 from antennate.errors import BadInputError, LogError
 from antennate.hardware.config import RobotConfig
+from antennate.params.scene import HookParams
 from antennate.robots.spec import RobotSpec
 from antennate.studies.pool import Workers
 from antennate.types import Floats
@@ -30,6 +33,7 @@ from antennate_lab.fit.simulated import Course, simulated
 
 SMALL = RobotSpec(links=2, mass=0.8, antennae={"kind": "none"})  # type: ignore[arg-type]
 """One yaw joint and four legs: a model that is quick."""
+VICE = HookParams(firm=True)
 GAIN, DELAY, INERTIA = 190.0, 0.012, 0.0045
 
 
@@ -81,7 +85,7 @@ def test_lag_is_the_shift_of_a_sine() -> None:
     t = np.arange(0.0, 4.0, 0.01)
     goals, angles = (0.3 * np.sin(math.pi * (t - late))[:, None] for late in (0.0, 0.03))
     turning = np.tile([0.0, 0.0, 0.25], (len(t), 1))
-    course = Course("step", False, 0.01, 2.0, goals, angles, turning, np.zeros((len(t), 0)))
+    course = Course("step", None, 0.01, 2.0, goals, angles, turning, np.zeros((len(t), 0)))
     assert measures.lags(course) == pytest.approx([0.03], rel=0.01)
     assert measures.turn(course) == pytest.approx(0.5, rel=1e-6)
 
@@ -117,7 +121,7 @@ def test_backlash_drives_what_a_simulation_feels() -> None:
     goals = np.zeros((100, 19))
     goals[:, 2] = 0.2 * np.sin(np.arange(100) * 0.1)
     none = np.zeros((100, 0))
-    course = Course("yaw3", True, 0.01, 0.0, goals, goals, none, none)
+    course = Course("yaw3", HookParams(), 0.01, 0.0, goals, goals, none, none)
     (backlash,) = parameters(robot, [("yaw.backlash", 2)])
     loose = changed(robot, [backlash], [0.03])
     tight, same, slack = (simulated(each, course).gyro for each in (robot, robot, loose))
@@ -136,6 +140,48 @@ def test_log_of_another_robot_is_refused(tmp_path: Path) -> None:
     )
     with pytest.raises(BadInputError, match="servo_names xl430_w250, found xc430_w240"):
         recording.read(path, other)
+
+
+def test_log_of_a_heavier_robot_is_named(tmp_path: Path) -> None:
+    """Joints and servos are those of the file, the mass is not."""
+    path = write(tmp_path / "drive.mcap", SMALL, sweeps(SMALL, "leg_l0"))
+    lighter = SMALL.model_copy(update={"mass": 0.7})
+    (warning,) = recording.read(path, lighter).warnings
+    assert "robot with mass 0.8, --robot has 0.7: another robot?" in warning
+
+
+def test_servo_of_another_model_is_named(tmp_path: Path) -> None:
+    """Three legs follow 40 ms late; the fourth as late, or 60 ms."""
+    place = SMALL.joint_names.index("leg_r1")
+
+    def measured(step: Step, goals: Floats, odd: int) -> Floats:
+        moves = SMALL.joint_names.index(step.joint)
+        late = odd if moves == place else 4
+        return np.concatenate([goals[:1]] * late + [goals[:-late]])
+
+    slow = [s.model_copy(update={"highest": 0.5}) for s in sweeps(SMALL, *SMALL.leg_names).steps]
+    protocol = Protocol(steps=tuple(slow))
+    for odd, names in ((4, []), (6, ["leg_r1"])):
+        path = tmp_path / f"drive{odd}.mcap"
+        write(path, SMALL, protocol, lambda step, goals, odd=odd: measured(step, goals, odd))
+        warnings = recording.read(path, SMALL).warnings
+        assert [warning.split()[0] for warning in warnings] == names
+    found = re.search(r"follows (\d+) ms late, other legs (\d+) ms: a servo of anoth", warnings[0])
+    assert found is not None
+    assert [int(lag) for lag in found.groups()] == pytest.approx([60, 40], rel=0.06)  # it stops
+
+
+def test_hook_of_the_protocol_is_simulated(tmp_path: Path) -> None:
+    """A robot that hangs by a soft hook, or in a vice, turns its head otherwise."""
+    robot = RobotSpec(imu={"kind": "head"})  # type: ignore[arg-type]
+    turning = []
+    for at, hook in enumerate((HookParams(), HookParams(twist_stiffness=20.0), VICE)):
+        protocol = sweeps(robot, "yaw3").model_copy(update={"hook": hook})
+        path = write(tmp_path / f"{at}.mcap", robot, protocol)
+        (course,) = recording.read(path, robot).courses
+        turning.append(simulated(robot, course).gyro[:, 2])
+    for one, other in itertools.combinations(turning, 2):
+        assert abs(one - other).max() > 0.02
 
 
 def test_protocol_cut_in_half_is_named(tmp_path: Path) -> None:
@@ -304,6 +350,6 @@ def test_simulation_begins_where_the_step_began() -> None:
     """The first angle is that of the measurement, whatever was commanded before."""
     goals = np.full((30, 5), 0.1)
     none = np.zeros((30, 0))
-    course = Course("still", False, 0.01, 0.0, goals, goals, none, none)
+    course = Course("still", None, 0.01, 0.0, goals, goals, none, none)
     begun = replace(course, positions=goals + 0.0)
     assert simulated(SMALL, begun).positions[0] == pytest.approx(goals[0], abs=0.02)

@@ -26,12 +26,14 @@ ROBUST = 3.0
 """Residuals beyond so many standard deviations count in proportion, not by their square."""
 DRAWS = 400
 """Draws of a bootstrap."""
-_ROUNDS = 20
+_ROUNDS = 40
 """Most steps of a search."""
 _ENOUGH = 0.02
 """A search goes over to pieces when a step improves the cost by less than this share."""
 _SHORT = 0.3
 """A search is done when a step is shorter than this in all directions [standard deviations]."""
+_SMALL_PLAY = 3.0
+"""A backlash of less than so many nudges is tried without."""
 _MOST_DAMPING = 1e3
 """A search is done, too, when no shorter step than that of this damping improves it."""
 
@@ -77,6 +79,8 @@ class Problem:
         )
         self.start = np.array([each.searched(each.start) for each in self.chosen])
         self.spread = np.array([each.scale.spread for each in self.chosen])
+        self.nudge = np.array([each.scale.nudge for each in self.chosen])
+        self.plays = np.array([each.path == BACKLASH for each in self.chosen])
 
     def _tells(self, course: Course, measured: Floats) -> Bools:
         """Which parameters change what is measured in a course."""
@@ -129,6 +133,10 @@ class Problem:
         parts = zip(predicted, self.measured, self.noise, strict=True)
         return [(simulated - measured) / noise for simulated, measured, noise in parts]
 
+    def in_noise(self, slopes: Sequence[Floats]) -> list[Floats]:
+        """Slopes of the residuals, from those of the channels."""
+        return [slope / noise[..., None] for slope, noise in zip(slopes, self.noise, strict=True)]
+
     def cost(self, x: Floats, predicted: Sequence[Floats]) -> float:
         """Robust cost of a place, soft L1, the prior too."""
         spread = sum(
@@ -138,8 +146,8 @@ class Problem:
         return ROBUST**2 * spread + 0.5 * float((self.prior(x) ** 2).sum())
 
     def slopes(self, x: Floats, predicted: Sequence[Floats]) -> list[Floats]:
-        """Change of the residuals with each parameter, one simulation for each that is told."""
-        steps = np.array([each.scale.nudge for each in self.chosen])
+        """Change of the channels with each parameter, (n, C, P), a simulation for each told one."""
+        steps = np.where(self.plays & (x == 0.0), 3.0 * self.nudge, self.nudge)
         steps = np.where(x + steps > bounds(self.chosen)[1], -steps, steps)
         places = [
             (x + step * np.eye(len(x))[p], np.flatnonzero(self.told[:, p]))
@@ -148,8 +156,29 @@ class Problem:
         slopes = [np.zeros((*each.shape, len(x))) for each in predicted]
         for p, found in enumerate(self.predictions(places)):
             for i, moved in zip(places[p][1].tolist(), found, strict=True):
-                slopes[i][:, :, p] = (moved - predicted[i]) / self.noise[i] / steps[p]
+                slopes[i][:, :, p] = (moved - predicted[i]) / steps[p]
         return slopes
+
+    def updated(
+        self, slopes: Sequence[Floats], step: Floats, changes: Sequence[Floats], scale: Floats
+    ) -> list[Floats]:
+        """Slopes that agree with what a step has changed, else as little changed as may be.
+
+        Broyden's update (Mathematics of Computation 19, 1965), of what a course depends on alone.
+        """
+        found = []
+        for told, slope, change in zip(self.told, slopes, changes, strict=True):
+            along = scale * step * told
+            missed = change - slope @ step
+            found.append(slope + missed[..., None] * along / max(float(along @ step), 1e-300))
+        return found
+
+    def snapped(self, x: Floats) -> Floats:
+        """The place with backlashes below a nudge at 0.
+
+        The ends of a play are soft, so that one of nearly 0 differs from none.
+        """
+        return np.where(self.plays & (x < self.nudge), 0.0, x)
 
     def prior(self, x: Floats) -> Floats:
         """How far a place is from what was known before, in its standard deviations."""
@@ -173,61 +202,68 @@ class Solution:
     slopes: list[Floats]
 
 
-def solve(problem: Problem, begin: Floats, rounds: int = _ROUNDS) -> Solution:
+def solve(problem: Problem, begin: Floats, rough: bool = False) -> Solution:
     """Best parameters from a place on.
 
-    Levenberg and Marquardt's steps, each within the bounds by SciPy's `lsq_linear`. The noise of a
-    channel is at least what its residuals are at present, so that a start that is far off counts
-    all of them. When that has settled, each piece of a course has its own: what a step before has
-    left swinging counts less.
+    Levenberg and Marquardt's steps, each within the bounds by SciPy's `lsq_linear`, and in no
+    direction longer than the standard deviation of what was known before. Slopes are simulated
+    where a step does not do what those before say; in between each step corrects them. The noise of
+    a channel is at least what its residuals are at present, so that a start that is far off counts
+    all of them. When that has settled, a search that is not to be rough goes on with a noise of
+    each piece of a course: what a step before has left swinging counts less.
     """
     low, high = bounds(problem.chosen)
     x = np.clip(begin, low, high)
     every = np.arange(len(problem.courses))
     predicted = problem.predictions([(x, every)])[0]
-    damping, by_piece = 1e-3, False
-    for number in range(rounds):
+    slopes = problem.slopes(x, predicted)
+    damping, by_piece, fresh = 1e-3, False, True
+    for number in range(_ROUNDS):
         problem.noise = noises(problem, predicted, by_piece)
         cost = problem.cost(x, predicted)
-        residuals, slopes = problem.residuals(predicted), problem.slopes(x, predicted)
-        bend, pull = _normal(problem, x, residuals, slopes)
-        gain, step = 0.0, np.zeros_like(x)
-        while damping < _MOST_DAMPING:
-            step = _bounded(bend, pull, damping, low - x, high - x)
+        bend, pull = _normal(problem, x, problem.residuals(predicted), problem.in_noise(slopes))
+        sure = np.sqrt(np.diag(np.linalg.inv(bend)))
+        gain, short = 0.0, False
+        while damping < _MOST_DAMPING and not short:
+            ends = np.maximum(low - x, -problem.spread), np.minimum(high - x, problem.spread)
+            step = _bounded(bend, pull, damping, *ends)
+            short = bool((abs(step) < _SHORT * sure).all())
+            step = problem.snapped(x + step) - x
             new = problem.predictions([(x + step, every)])[0]
             gain = cost - problem.cost(x + step, new)
-            damping = damping / 10.0 if gain > 0.0 else damping * 10.0
+            damping = damping / 10.0 if gain > 0.0 else damping * 10.0 if fresh else damping
             if gain > 0.0:
+                changes = [after - before for after, before in zip(new, predicted, strict=True)]
+                slopes = problem.updated(slopes, step, changes, np.diag(bend))
                 x, predicted = x + step, new
+            if gain > 0.0 or not fresh:
                 break
-        problem.on_step(number + 1, rounds)
-        short = bool((abs(step) < _SHORT * np.sqrt(np.diag(np.linalg.inv(bend)))).all())
-        if by_piece and (short or gain <= 0.0):
+        problem.on_step(number + 1, _ROUNDS)
+        settled = short or gain < _ENOUGH * cost
+        if fresh and settled and (rough or (by_piece and (short or gain <= 0.0))):
             break
-        if not by_piece and (short or gain < _ENOUGH * cost):
+        if fresh and settled and not by_piece:
             by_piece, damping = True, 1e-3
             x, predicted = _without_small_plays(problem, x, predicted)
+        fresh = settled
+        if settled:
+            slopes = problem.slopes(x, predicted)
     problem.noise = noises(problem, predicted, by_piece=True)
     whole = zip(noises(problem, predicted), problem.least, strict=True)
     misfit = float(np.mean([((noise / least) ** 2).mean() for noise, least in whole]))
-    slopes = problem.slopes(x, predicted)
-    return Solution(x, misfit, problem.residuals(predicted), slopes)
+    return Solution(x, misfit, problem.residuals(predicted), problem.in_noise(slopes))
 
 
 def _without_small_plays(
     problem: Problem, x: Floats, predicted: list[Floats]
 ) -> tuple[Floats, list[Floats]]:
-    """The place with those small backlashes at 0 that the courses do not need.
-
-    The ends of a play are soft, so that one of nearly 0 differs from none, and a search stays.
-    """
+    """The place with those small backlashes at 0 that the courses do not need."""
     every = np.arange(len(problem.courses))
-    for p, each in enumerate(problem.chosen):
-        if each.path == BACKLASH and 0.0 < x[p] < each.scale.nudge:
-            none = np.where(np.arange(len(x)) == p, 0.0, x)
-            new = problem.predictions([(none, every)])[0]
-            if problem.cost(none, new) < problem.cost(x, predicted):
-                x, predicted = none, new
+    for p in np.flatnonzero(problem.plays & (x > 0.0) & (x < _SMALL_PLAY * problem.nudge)):
+        none = np.where(np.arange(len(x)) == p, 0.0, x)
+        new = problem.predictions([(none, every)])[0]
+        if problem.cost(none, new) < problem.cost(x, predicted):
+            x, predicted = none, new
     return x, predicted
 
 

@@ -12,11 +12,14 @@ from pathlib import Path
 import numpy as np
 
 from antennate.errors import BadInputError
+from antennate.params.scene import HookParams
 from antennate.robots.spec import RobotSpec
 from antennate.telemetry.reader import LogReader
 from antennate.telemetry.steps import LoggedStep, protocol_of, steps
 from antennate.telemetry.ticks import Tick
 from antennate.types import Floats
+from antennate_lab.fit import measures
+from antennate_lab.fit.residuals import moving
 from antennate_lab.fit.simulated import Course
 from antennate_lab.servo.drive_log import log_hash
 
@@ -26,8 +29,14 @@ FEWEST = 50
 """Fewest ticks of a step that can be compared."""
 _LOST = 0.2
 """A step in which a joint lacks a larger share of its measurements is left out (assumed)."""
+ODD = 1.3
+"""A joint whose lag differs from those of its group by more than this factor is named."""
+_MUCH = 0.001
+"""And by more than this, a tenth of a tick [s]."""
 _PARTS = ("links", "joint_names", "servo_names", "ids")
 """What a log and a robot's file must agree on."""
+_SIZES = ("mass", "link_pitch", "leg_radius", "leg_eccentricity", "leg_mass")
+"""What a fit takes from the robot's file; that of the log should agree."""
 
 
 @dataclass(frozen=True)
@@ -63,9 +72,11 @@ def read(path: Path, robot: RobotSpec) -> Recording:
         BadInputError: It is a log of another robot, or of no protocol, or holds no whole step.
     """
     with LogReader(path) as log:
-        _require_same(path, log.header.robot, robot)
+        logged = log.header.robot
+        _require_same(path, logged, robot)
         period = log.header.params.period
-        planned = [step.called for step in protocol_of(log).steps]
+        protocol = protocol_of(log)
+        planned = [step.called for step in protocol.steps]
         ticks = {tick.number: tick for tick in log}
     found = {step.name: step for step in steps(path) if step.whole}
     missing = [name for name in planned if name not in found]
@@ -76,7 +87,7 @@ def read(path: Path, robot: RobotSpec) -> Recording:
             left_out[step.name] = "what a hand did is not in the log"
             continue
         own = [ticks[n] for n in range(step.begin, step.end) if n in ticks]
-        course, why = _course(step, own, robot, period)
+        course, why = _course(step, own, robot, period, protocol.hook)
         if course is None:
             left_out[step.name] = why
         else:
@@ -88,7 +99,12 @@ def read(path: Path, robot: RobotSpec) -> Recording:
     within = [
         [ticks[n] for n in range(step.begin, step.end) if n in ticks] for step in found.values()
     ]
-    warnings = _drift(within, period)
+    warnings = _drift(within, period) + _odd_joints(robot, courses)
+    warnings += [
+        f"the log is of a robot with {name} {theirs:g}, --robot has {ours:g}: another robot?"
+        for name in _SIZES
+        if (theirs := getattr(logged, name)) != (ours := getattr(robot, name))
+    ]
     if missing:
         warnings.append(
             f"{len(missing)} of {len(planned)} steps of the protocol are missing, from "
@@ -97,6 +113,24 @@ def read(path: Path, robot: RobotSpec) -> Recording:
     zero = _gyro_zero(courses)
     courses = [replace(course, gyro=course.gyro - zero) for course in courses]
     return Recording(path.stem, log_hash(path), courses, zero, left_out, warnings)
+
+
+def _odd_joints(robot: RobotSpec, courses: list[Course]) -> list[str]:
+    """Legs and antenna bases that follow unlike the others, each alone in the air."""
+    told = []
+    for group in ("legs", "antennae"):
+        names = robot.joint_names[robot.places(group)]
+        alone = [course for course in courses if course.hanging and len(moving(course)) == 1]
+        lags = {robot.joint_names[moving(c)[0]]: float(measures.lags(c)[0]) for c in alone}
+        own = {name: lag for name, lag in lags.items() if name in names}
+        usual = float(np.median(list(own.values()))) if own else 0.0
+        told += [
+            f"{name} follows {1e3 * lag:.0f} ms late, other {group} {1e3 * usual:.0f} ms: a servo "
+            "of another model, or a damaged one?"
+            for name, lag in own.items()
+            if max(lag, usual) > ODD * min(lag, usual) + _MUCH
+        ]
+    return told
 
 
 def _gyro_zero(courses: list[Course]) -> Floats:
@@ -125,7 +159,7 @@ def _shown(value: object, other: object) -> str:
 
 
 def _course(
-    step: LoggedStep, ticks: list[Tick], robot: RobotSpec, period: float
+    step: LoggedStep, ticks: list[Tick], robot: RobotSpec, period: float, hook: HookParams
 ) -> tuple[Course | None, str]:
     """A step on the grid of the control period, or why there is none."""
     if len(ticks) < FEWEST:
@@ -145,7 +179,7 @@ def _course(
     return (
         Course(
             name=step.name,
-            hanging=step.place == "hanging",
+            hook=hook if step.place == "hanging" else None,
             period=period,
             cycle=1.0 / step.step.frequency if walks else 0.0,
             commands=commands[held],

@@ -33,8 +33,6 @@ _LEVEL = 0.4
 """Standard deviation of the logarithm of the friction that all legs share, before."""
 _AIR, _ALL = 400, 1000
 """Steps of the progress line when the air is done, and at the end."""
-_ODD = 1.3
-"""A joint whose lag differs from those of its group by more than this factor is named."""
 
 
 @dataclass(frozen=True)
@@ -145,7 +143,6 @@ def run(config: FitConfig, workers: int | Workers, on_step: OnStep = no_step) ->
         made = gather(_simulated, tasks, pool, no_step)
     pairs = list(zip(made[::2], made[1::2], strict=True))
     warnings = [f"{each.name}: {text}" for each in recordings for text in each.warnings]
-    warnings += _odd_joints(robot, courses)
     on_step(_ALL, _ALL)
     return FitOutcome(config, robot, after, recordings, courses, held, pairs, found, warnings)
 
@@ -225,9 +222,12 @@ def _names(robot: RobotSpec) -> list[tuple[str, int | None]]:
 def _start(
     robot: RobotSpec, chosen: Sequence[Parameter], air: list[Course], pool: Workers
 ) -> Floats:
-    """Place at which the search begins: the best of several, by the lightest joints alone."""
+    """Place at which the search begins: the best of several, by the lightest joints alone.
+
+    Gains and delays alone are searched: inertia and friction would make up for a wrong gain.
+    """
     light = [c for c in air if len(moving(c)) > 1] or air[:1]
-    few = [each for each in chosen if each.path.startswith("servos.")]
+    few = [each for each in chosen if each.path.endswith(("gain_divisor", "delay"))]
     found = []
     for gain in _GAINS:
         problem = Problem(robot, light, few, pool)
@@ -237,7 +237,7 @@ def _start(
                 begin[place] -= np.log(gain)
             if each.path.endswith("delay"):
                 begin[place] = max(begin[place], _DELAY)
-        found.append(least_squares.solve(problem, begin, rounds=4))
+        found.append(least_squares.solve(problem, begin, rough=True))
     best = min(found, key=lambda each: each.misfit)
     known = dict(zip([each.name for each in few], best.x.tolist(), strict=True))
     return np.array([known.get(each.name, each.searched(each.start)) for each in chosen])
@@ -266,33 +266,6 @@ def _on_floor(
 
     legs = regression.search(made, chosen, walks, prior, config.robots, pool, rng, told)
     return of_legs(robot, legs, prior, rng)
-
-
-def _odd_joints(robot: RobotSpec, courses: Sequence[tuple[str, Course]]) -> list[str]:
-    """Joints that follow unlike the others of their group, alone in the air."""
-    found: dict[str, dict[str, float]] = {}
-    for _, course in courses:
-        joints = moving(course)
-        if course.hanging and len(joints) == 1:
-            group = next(g for g, _, _ in robot.groups if _holds(robot, g, int(joints[0])))
-            lag = float(measures.lags(course)[0])
-            found.setdefault(group, {})[robot.joint_names[int(joints[0])]] = lag
-    told = []
-    for group, lags in found.items():
-        usual = float(np.median(list(lags.values())))
-        for name, lag in lags.items():
-            alike = group == "legs" or group == "antennae"
-            if alike and len(lags) > 1 and not 1.0 / _ODD < lag / usual < _ODD:
-                told.append(
-                    f"{name} follows {1e3 * lag:.0f} ms late, other {group} {1e3 * usual:.0f} ms: "
-                    "a servo of another model, or a damaged one?"
-                )
-    return told
-
-
-def _holds(robot: RobotSpec, group: str, joint: int) -> bool:
-    places = robot.places(group)  # type: ignore[arg-type]
-    return places.start <= joint < places.stop
 
 
 def _noise(recordings: Sequence[Recording]) -> dict[str, float]:

@@ -6,21 +6,24 @@ wrong before counts.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from antennate.params.scene import PhysicsParams, VariationParams
+from antennate.params.scene import HookParams, PhysicsParams, VariationParams
 from antennate.robots.spec import RobotSpec
 from antennate.sim.engine import mujoco
+from antennate.sim.hook import Hook
 from antennate.sim.sim_robot import Disturbance, SimRobot
-from antennate.sim.world import PREFIX, World, add_robot, compile_world, new_spec
+from antennate.sim.world import PREFIX, World, add_robot, new_spec, world_spec
 from antennate.types import Floats, JointCommand
 
 PHYSICS = PhysicsParams()
-SETTLING = 1.0
-"""Time for which the first command is held before a step begins [s]."""
+SETTLING, CALMING = 0.5, 0.8
+"""Time for which the first command is held before a step begins [s], and what is left there of all
+speeds after a tick: hanging, a robot would bob for seconds."""
 HEIGHT = 0.1
 """How much higher than on the floor a robot hangs [m], so that no end that sags is below 0."""
 _CALM = VariationParams(joint_bias=0.0, slip_log_sd=0.0, reading_noise=0.0)
@@ -33,7 +36,7 @@ class Course:
 
     Attributes:
         name: Name of the step.
-        hanging: Whether the middle link was held, the legs in the air; else the robot stood.
+        hook: What held the middle link, the legs in the air; None for a robot on the floor.
         period: Control period [s].
         cycle: Period of the gait [s], 0 where there is none.
         commands: Commanded angles of all joints [rad], shape (n, J).
@@ -43,13 +46,18 @@ class Course:
     """
 
     name: str
-    hanging: bool
+    hook: HookParams | None
     period: float
     cycle: float
     commands: Floats
     positions: Floats
     gyro: Floats
     counts: Floats
+
+    @property
+    def hanging(self) -> bool:
+        """Whether the robot hung."""
+        return self.hook is not None
 
 
 def simulated(
@@ -66,17 +74,18 @@ def simulated(
         SimulationError: The robot falls over or flies apart.
     """
     robot = _silent(robot)
-    world = world_of(robot, course.hanging)
-    world.place_drives(course.positions[0])
+    world = world_of(robot, course.hook, course.positions[0])
     sim = SimRobot(1, robot, course.period, PHYSICS.timestep)
     sim.load(0, world, Disturbance(np.random.default_rng(0), _CALM, robot, course.period))
     before = round(SETTLING / course.period)
-    felt = []
-    for tick, angles in enumerate([*[course.commands[0]] * before, *course.commands]):
+    felt, rows = [], np.concatenate([course.commands[:1]] * before + [course.commands])
+    for tick, command in enumerate(commands(robot, rows)):
         felt.append(sim.read())
         if tick >= before:
             look(world)
-        sim.write(command(robot, angles))
+        else:
+            world.data.qvel *= CALMING
+        sim.write(command)
         sim.sleep_until((tick + 1) * course.period)
     for failure in sim.failures.values():
         raise failure
@@ -94,26 +103,33 @@ def _silent(robot: RobotSpec) -> RobotSpec:
     return robot.model_copy(update={"imu": robot.imu.model_copy(update=_SILENT)})
 
 
-def world_of(robot: RobotSpec, hanging: bool) -> World:
-    """The robot on a bare floor, or held by its middle link in the air."""
-    if not hanging:
-        return World(compile_world(PHYSICS, robot), robot)
-    spec = new_spec(PHYSICS)
-    add_robot(spec, robot, PHYSICS)
-    spec.body(PREFIX + robot.link_names[0]).pos[2] += HEIGHT
-    held = spec.add_equality(
-        type=mujoco.mjtEq.mjEQ_WELD,
-        objtype=mujoco.mjtObj.mjOBJ_BODY,
-        name1=PREFIX + robot.link_names[robot.links // 2],
-    )
-    held.solref[0] = PHYSICS.contact_time
-    return World(spec.compile(), robot)
+def world_of(robot: RobotSpec, hook: HookParams | None, angles: Floats) -> World:
+    """The robot with its joints at some angles [rad], on a bare floor or in the air by a hook."""
+    spec = world_spec(PHYSICS, robot) if hook is None else new_spec(PHYSICS)
+    if hook is not None:
+        add_robot(spec, robot, PHYSICS)
+        spec.body(PREFIX + robot.link_names[0]).pos[2] += HEIGHT
+        if hook.firm:
+            held = spec.add_equality(
+                type=mujoco.mjtEq.mjEQ_WELD,
+                objtype=mujoco.mjtObj.mjOBJ_BODY,
+                name1=PREFIX + robot.link_names[robot.links // 2],
+            )
+            held.solref[0] = PHYSICS.contact_time
+    world = World(spec.compile(), robot)
+    world.place_drives(angles)
+    if hook is not None and not hook.firm:
+        spring = Hook(world, hook)
+        spring.grasp()
+        world.forces = spring.pull
+    return world
 
 
-def command(robot: RobotSpec, angles: Floats) -> JointCommand:
-    """Angles of all joints in the robot's order, as a command."""
-    shapes = robot.command_shapes()
-    ends = np.cumsum([int(np.prod(shape)) for shape in shapes.values()])
-    parts = np.split(angles, ends[:-1])
-    pairs = zip(shapes.items(), parts, strict=True)
-    return JointCommand(**{name: part.reshape(shape) for (name, shape), part in pairs})
+def commands(robot: RobotSpec, rows: Floats) -> Iterator[JointCommand]:
+    """Commands of rows of angles of all joints in the robot's order [rad], shape (n, J)."""
+    shapes = robot.command_shapes(len(rows))
+    ends = np.cumsum([math.prod(shape[1:]) for shape in shapes.values()])
+    pairs = zip(shapes.items(), np.split(rows, ends[:-1], axis=1), strict=True)
+    parts = {name: part.reshape(shape) for (name, shape), part in pairs}
+    for tick in range(len(rows)):
+        yield JointCommand(**{name: part[tick : tick + 1] for name, part in parts.items()})

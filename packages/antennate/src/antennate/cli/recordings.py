@@ -18,6 +18,7 @@ from antennate.hardware.config import DriveConfig
 from antennate.hardware.driving.protocol import Course, ProtocolController
 from antennate.hardware.safety.session import Session
 from antennate.messages import typed
+from antennate.params.scene import HookParams
 from antennate.studies.run_directory import RunDirectory
 from antennate.studies.run_files import LOG
 from antennate.telemetry.header import MOST_PARTS, Header
@@ -118,6 +119,10 @@ def recordings(config: DriveConfig, tell: Path | None) -> Iterator[Recordings]:
         protocol = given.made_for(config.robot, config.control)
     except ConfigError as error:
         raise ConfigError(f"{config.protocol}: {error}") from None
+    if tell is not None and protocol.hook != HookParams():
+        raise ConfigError(
+            f"{config.protocol}: hook: expected the hook of the twin beside --tell, found another"
+        )
     by_time = tell is not None or config.hold_to_run
     with teller(tell) as told, _confirmations(by_time) as confirmed:
         yield Recordings(protocol, confirmed, told)

@@ -24,6 +24,7 @@ from antennate.errors import ConfigError
 from antennate.messages import nearest, shown
 from antennate.params.base import Params, number, own_file, read_file
 from antennate.params.control import ControlParams
+from antennate.params.scene import HookParams
 from antennate.robots.spec import RobotSpec
 from antennate.types import Floats, Maneuver, joint_angles
 
@@ -108,6 +109,8 @@ class Protocol(Params):
     """Time to hang the robot or to put it down, where nobody confirms it by a key."""
     reach: float = number(3.0, "s", "assumed: a hand at the robot", ge=0, le=600)
     """Time to push an antenna, where nobody confirms it by a key."""
+    hook: HookParams = HookParams()
+    """What the robot hangs by; `fit` simulates it. The default is the hook of the twin."""
     steps: tuple[Step, ...] = number((), "1", "assumed: none")
     """Steps in their order."""
 

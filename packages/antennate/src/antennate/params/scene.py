@@ -250,6 +250,27 @@ GROUND_READS: Mapping[str, tuple[str, ...]] = {
 """Sizes that each scene of ground reads."""
 
 
+class HookParams(Params):
+    """Hook by which a robot hangs: a spring that holds its middle link level, for recordings."""
+
+    firm: bool = number(False, "1", "assumed: a hook, as the twin has one")
+    """Whether the link is held firmly, as in a vice; then nothing else counts."""
+    stiffness: float = number(
+        3000.0, "N/m", "assumed: a robot of 2 kg makes it give by 7 mm", ge=500, le=6000
+    )
+    """Stiffness against a shift in any direction."""
+    damping: float = number(40.0, "N·s/m", "assumed: a swing dies in a second", ge=20, le=80)
+    """Damping of that."""
+    twist_stiffness: float = number(
+        100.0, "N·m/rad", "assumed: a clamp of plastic, 1 mm at 0.1 m under 10 N", ge=20, le=120
+    )
+    """Stiffness against a turn about any axis."""
+    twist_damping: float = number(
+        0.3, "N·m·s/rad", "assumed: a twist dies in a second", ge=0.3, le=0.6
+    )
+    """Damping of that."""
+
+
 class PhysicsParams(Params):
     """Numerics of the simulation, measured by benchmarks/numerics.py."""
 

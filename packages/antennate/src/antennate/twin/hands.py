@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from antennate.params.scene import HookParams
 from antennate.robots.spec import ANTENNA_PREFIXES
-from antennate.sim.engine import mujoco
+from antennate.sim.hook import Hook
 from antennate.sim.world import PREFIX, World
 from antennate.twin.board import Press
-from antennate.types import Floats
 
 _PRESSING = 0.05
 """Time constant with which a hand presses [s] (assumed); it lets go at once."""
@@ -16,14 +16,10 @@ _LIFT = 0.1
 """Height to which the robot is raised [m]: its legs are free (assumed)."""
 _LIFTING = 0.1
 """Speed of raising and lowering it [m/s] (assumed)."""
-_HOOK = 3000.0, 40.0
-"""Stiffness [N/m] and damping [N·s/m] of the hook: 2 kg give by 7 mm (assumed)."""
-_TWIST = 100.0, 0.3
-"""Likewise of its turning [N·m/rad, N·m·s/rad] (assumed)."""
 
 
 class Hands:
-    """Hands that press antennae, and a hook that holds the middle link, level, by a spring.
+    """Hands that press antennae, and a hook that raises the robot by its middle link.
 
     Args:
         world: The world; its forces are set before each physics step.
@@ -35,12 +31,10 @@ class Hands:
 
     def __init__(self, world: World) -> None:
         self._world, self._forces = world, world.data.xfrc_applied
-        self._link = int(world.places.links[world.robot.links // 2])
+        self._hook = Hook(world, HookParams())
         self.hanging = False
         self.presses: list[Press | None] = [None, None]
         self._force = [0.0, 0.0]
-        self._place: Floats = np.zeros(3)
-        self._level: Floats = np.eye(3)
         self._height = 0.0
         world.forces = self._apply
 
@@ -76,23 +70,11 @@ class Hands:
         self._forces[body] = [*force, *np.cross(arm - world.data.xipos[body], force)]
 
     def _hold(self) -> None:
-        """Hold the middle link level, at a height that goes to where it is wanted."""
-        data, body = self._world.data, self._link
-        turn = data.xmat[body].reshape(3, 3)
+        """Hold the middle link at a height that goes to where it is wanted."""
         if not self._height:  # it stands
-            self._place = data.xpos[body].copy()
-            ahead = turn[:2, 0] / np.hypot(*turn[:2, 0])
-            self._level[:2, :2] = np.array([ahead, [-ahead[1], ahead[0]]]).T
+            self._hook.grasp()
         way = _LIFTING * self._world.model.opt.timestep
         goal = _LIFT if self.hanging else 0.0
         self._height += float(np.clip(goal - self._height, -way, way))
-        speed = np.zeros(6)
-        kind = mujoco.mjtObj.mjOBJ_XBODY
-        mujoco.mj_objectVelocity(self._world.model, data, kind, body, speed, 0)
-        away = self._place - data.xpos[body]
-        away[2] += self._height
-        force = _HOOK[0] * away - _HOOK[1] * speed[3:]
-        twist = 0.5 * np.cross(turn.T, self._level.T).sum(axis=0)
-        torque = _TWIST[0] * twist - _TWIST[1] * speed[:3]
-        torque += np.cross(data.xpos[body] - data.xipos[body], force)
-        self._forces[body] = [*force, *torque] if self._height else 0.0
+        if self._height:
+            self._hook.pull(self._height)
