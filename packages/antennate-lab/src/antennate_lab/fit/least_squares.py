@@ -14,6 +14,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.optimize import lsq_linear
 
+from antennate.errors import SimulationError
 from antennate.robots.spec import RobotSpec
 from antennate.studies.pool import Workers, gather
 from antennate.studies.trials import OnStep, no_step
@@ -34,14 +35,12 @@ _SHORT = 0.3
 """A search is done when a step is shorter than this in all directions [standard deviations]."""
 _SMALL_PLAY = 3.0
 """A backlash of less than so many nudges is tried without."""
-_MOST_DAMPING = 1e3
-"""A search is done, too, when no shorter step than that of this damping improves it."""
+_LEAST_DAMPING, _MOST_DAMPING = 1e-3, 1e3
+"""A search is done, too, when no shorter step than that of the most damping improves it."""
 
 
 def _channels_of(robot: RobotSpec, course: Course) -> Floats:
     """Channels of a simulated course; far off where the simulation fails."""
-    from antennate.errors import SimulationError
-
     try:
         return channels(robot, simulated(robot, course), course)
     except SimulationError:
@@ -217,7 +216,7 @@ def solve(problem: Problem, begin: Floats, rough: bool = False) -> Solution:
     every = np.arange(len(problem.courses))
     predicted = problem.predictions([(x, every)])[0]
     slopes = problem.slopes(x, predicted)
-    damping, by_piece, fresh = 1e-3, False, True
+    damping, by_piece, fresh = _LEAST_DAMPING, False, True
     for number in range(_ROUNDS):
         problem.noise = noises(problem, predicted, by_piece)
         cost = problem.cost(x, predicted)
@@ -231,23 +230,26 @@ def solve(problem: Problem, begin: Floats, rough: bool = False) -> Solution:
             step = problem.snapped(x + step) - x
             new = problem.predictions([(x + step, every)])[0]
             gain = cost - problem.cost(x + step, new)
-            damping = damping / 10.0 if gain > 0.0 else damping * 10.0 if fresh else damping
             if gain > 0.0:
+                damping = max(damping / 10.0, _LEAST_DAMPING)
                 changes = [after - before for after, before in zip(new, predicted, strict=True)]
                 slopes = problem.updated(slopes, step, changes, np.diag(bend))
                 x, predicted = x + step, new
             if gain > 0.0 or not fresh:
                 break
+            damping *= 10.0
         problem.on_step(number + 1, _ROUNDS)
-        settled = short or gain < _ENOUGH * cost
-        if fresh and settled and (rough or (by_piece and (short or gain <= 0.0))):
+        settled = short or gain <= (0.0 if by_piece else _ENOUGH * cost)
+        if fresh and settled and (rough or by_piece):
             break
-        if fresh and settled and not by_piece:
-            by_piece, damping = True, 1e-3
+        if fresh and settled:
+            by_piece, damping = True, _LEAST_DAMPING
             x, predicted = _without_small_plays(problem, x, predicted)
         fresh = settled
         if settled:
             slopes = problem.slopes(x, predicted)
+    if not fresh:
+        slopes = problem.slopes(x, predicted)
     problem.noise = noises(problem, predicted, by_piece=True)
     whole = zip(noises(problem, predicted), problem.least, strict=True)
     misfit = float(np.mean([((noise / least) ** 2).mean() for noise, least in whole]))
@@ -340,12 +342,12 @@ def covariances(
             w, r = weight[number == k].ravel(), residual[number == k].ravel()
             bends.append((rows * w[:, None]).T @ rows)
             pulls.append(rows.T @ (w * r))
-    owner = np.repeat(np.arange(len(problem.courses)), [pieces(c)[-1] + 1 for c in problem.courses])
+    counts = [pieces(course)[-1] + 1 for course in problem.courses]
     bend, pull = np.array(bends), np.array(pulls)
     pinned = _pinned(problem, solution.x)
     draws = []
     for _ in range(DRAWS):
-        times = _drawn(owner, rng)
+        times = np.concatenate([rng.multinomial(n, np.full(n, 1.0 / n)) for n in counts])
         curvature = np.tensordot(times, bend, 1) + prior
         slope = (times[:, None] * pull).sum(axis=0) + problem.prior(solution.x) / problem.spread
         draws.append(-np.linalg.solve(curvature, slope * ~pinned))
@@ -358,12 +360,3 @@ def _pinned(problem: Problem, x: Floats) -> Bools:
     low, high = bounds(problem.chosen)
     near = 1e-3 * (high - low)
     return (x < low + near) | (x > high - near)
-
-
-def _drawn(owner: Ints, rng: np.random.Generator) -> Floats:
-    """How often each piece is drawn, as many of each course as it has, shape (pieces,)."""
-    times = np.zeros(len(owner))
-    for course in range(owner[-1] + 1):
-        own = np.flatnonzero(owner == course)
-        times += np.bincount(rng.choice(own, len(own)), minlength=len(owner))
-    return times

@@ -90,22 +90,6 @@ def _felt_of(robot: RobotSpec, courses: Sequence[Course], seed: int) -> Floats:
     return np.concatenate(parts)
 
 
-def drawn(
-    chosen: Sequence[Parameter], known: Known, count: int, rng: np.random.Generator
-) -> Floats:
-    """Places of the search, shape (count, P)."""
-    low, high = bounds(chosen)
-    return np.clip(known.draw(count, rng), low, high)
-
-
-def walked(
-    robots: Sequence[RobotSpec], courses: Sequence[Course], workers: Workers, on_step: OnStep
-) -> Floats:
-    """What robots feel in all courses, shape (robots, F)."""
-    tasks = [(robot, courses, seed) for seed, robot in enumerate(robots)]
-    return np.array(gather(_felt_of, tasks, workers, on_step))
-
-
 @dataclass(frozen=True)
 class Told:
     """What steps tell of the parameters, on the scale of the search.
@@ -199,14 +183,15 @@ def search(
     measured = np.concatenate([felt(made(prior.mean), course) for course in courses])
     proposal, told = prior, Told(prior.mean, prior.sd, np.eye(len(prior.mean)))
     for number in range(2):
-        places = drawn(chosen, proposal, count, rng)
-        features = walked(
-            [made(place) for place in places],
-            courses,
+        places = np.clip(proposal.draw(count, rng), *bounds(chosen))
+        tasks = [(made(place), courses, seed) for seed, place in enumerate(places)]
+        features = gather(
+            _felt_of,
+            tasks,
             workers,
             lambda done, _, number=number: on_step(number * count + done, 2 * count),
         )
-        told = regressed(places, features, measured, proposal, prior)
+        told = regressed(places, np.array(features), measured, proposal, prior)
         proposal = Known(told.mean, np.minimum(WIDER * told.sd, prior.sd))
     return told
 

@@ -40,7 +40,6 @@ class FitOutcome:
     """What a fit has found.
 
     Attributes:
-        before: The robot of the file.
         after: The fitted robot.
         recordings: Logs as they were read.
         courses: All courses of all logs, with the name of their log.
@@ -51,7 +50,6 @@ class FitOutcome:
     """
 
     config: FitConfig
-    before: RobotSpec
     after: RobotSpec
     recordings: list[Recording]
     courses: list[tuple[str, Course]]
@@ -144,7 +142,7 @@ def run(config: FitConfig, workers: int | Workers, on_step: OnStep = no_step) ->
     pairs = list(zip(made[::2], made[1::2], strict=True))
     warnings = [f"{each.name}: {text}" for each in recordings for text in each.warnings]
     on_step(_ALL, _ALL)
-    return FitOutcome(config, robot, after, recordings, courses, held, pairs, found, warnings)
+    return FitOutcome(config, after, recordings, courses, held, pairs, found, warnings)
 
 
 def with_told(robot: RobotSpec, found: Sequence[Estimate]) -> RobotSpec:
