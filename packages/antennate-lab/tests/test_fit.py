@@ -27,7 +27,9 @@ from antennate.types import Floats
 from antennate_lab.fit import least_squares, measures, recording, regression, robot_file
 from antennate_lab.fit.config import FitConfig
 from antennate_lab.fit.estimates import Estimate
+from antennate_lab.fit.experiment import sentence
 from antennate_lab.fit.parameters import LEG, SCALES, changed, parameters
+from antennate_lab.fit.result import FitResult, StepRow
 from antennate_lab.fit.run import run
 from antennate_lab.fit.simulated import Course, simulated
 
@@ -140,6 +142,34 @@ def test_log_of_another_robot_is_refused(tmp_path: Path) -> None:
     )
     with pytest.raises(BadInputError, match="servo_names xl430_w250, found xc430_w240"):
         recording.read(path, other)
+
+
+def test_command_refuses_the_log_of_another_robot(
+    tmp_path: Path, refused: Callable[..., str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """One line and exit code 2; nothing is written."""
+    monkeypatch.chdir(tmp_path)
+    write(tmp_path / "short.toml", SMALL, sweeps(SMALL, "leg_l0"))
+    line = refused("fit", "short.toml")
+    assert "expected the robot of --robot with links 6, found 2" in line
+
+
+def test_what_is_wrong_with_a_log_stands_on_the_page() -> None:
+    """The sentence above the tables ends with it."""
+    lags = {"lag_ms": 40.0, "lag_before_ms": 9.0, "lag_after_ms": 39.0}
+    turns = dict.fromkeys(("turn_deg", "turn_before_deg", "turn_after_deg"))
+    errors = {"error_before_deg": 9.0, "error_deg": 1.0}
+    step = StepRow(log="drive", step="leg_l0", fitted=True, **errors, **lags, **turns)
+    result = FitResult(
+        logs=[],
+        parameters=[],
+        steps=[step],
+        correlations=[],
+        noise={},
+        warnings=["drive: 2 of 3 steps of the protocol are missing"],
+        simulate="antennate tunnel --robot robot.toml",
+    )
+    assert "Beware: drive: 2 of 3 steps of the protocol are missing." in sentence(result)
 
 
 def test_log_of_a_heavier_robot_is_named(tmp_path: Path) -> None:
