@@ -151,7 +151,7 @@ def test_command_refuses_the_log_of_another_robot(
     monkeypatch.chdir(tmp_path)
     write(tmp_path / "short.toml", SMALL, sweeps(SMALL, "leg_l0"))
     line = refused("fit", "short.toml")
-    assert "expected the robot of --robot with links 6, found 2" in line
+    assert "with links 6, found 2; give the file of the robot that was driven" in line
 
 
 def test_what_is_wrong_with_a_log_stands_on_the_page() -> None:

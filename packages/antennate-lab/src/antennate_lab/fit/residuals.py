@@ -34,16 +34,16 @@ def moving(course: Course) -> Ints:
 
 
 def merged(robot: RobotSpec, courses: Sequence[Course]) -> list[Course]:
-    """Courses in the air, those of joints that do not feel one another as one.
+    """Courses in the air, those of legs as one.
 
-    Legs are light beside the body, and so are antennae, so that one simulation shows all of a kind.
+    Legs are light beside the body, so that one simulation shows all of them. Antennae are not
+    merged: what the head gives to one, the reading of the other feels.
     """
     groups: defaultdict[object, list[Course]] = defaultdict(list)
     for at, course in enumerate(courses):
-        kinds = {_kind(robot, joint) for joint in moving(course).tolist()}
-        (kind,) = kinds if len(kinds) == 1 else (str(at),)
-        groups[at if kind == "yaw" else kind, len(course.commands)].append(course)
-    return [_one(robot, *group) for group in groups.values()]
+        legs = {_kind(robot, joint) for joint in moving(course).tolist()} == {"legs"}
+        groups["legs" if legs else at, len(course.commands)].append(course)
+    return [_one(*group) for group in groups.values()]
 
 
 def _kind(robot: RobotSpec, joint: int) -> str:
@@ -55,23 +55,17 @@ def _kind(robot: RobotSpec, joint: int) -> str:
     return "yaw"
 
 
-def _one(robot: RobotSpec, first: Course, *others: Course) -> Course:
-    """Courses of joints that do not feel one another as one: each channel from its own course."""
+def _one(first: Course, *others: Course) -> Course:
+    """Courses of joints that do not feel one another as one: each angle from its own course."""
     if not others:
         return first
-    commands, positions, counts = (
-        part.copy() for part in (first.commands, first.positions, first.counts)
-    )
-    bases = robot.places("antennae")
+    commands, positions = first.commands.copy(), first.positions.copy()
     for course in others:
-        for joint in moving(course).tolist():
-            commands[:, joint] = course.commands[:, joint]
-            positions[:, joint] = course.positions[:, joint]
-            if bases.start <= joint < bases.stop:
-                side = joint - bases.start
-                counts[:, side] = course.counts[:, side]
+        joints = moving(course)
+        commands[:, joints] = course.commands[:, joints]
+        positions[:, joints] = course.positions[:, joints]
     name = f"{first.name} and {len(others)} others"
-    return replace(first, name=name, commands=commands, positions=positions, counts=counts)
+    return replace(first, name=name, commands=commands, positions=positions)
 
 
 def labels(robot: RobotSpec, course: Course) -> list[tuple[str, str]]:

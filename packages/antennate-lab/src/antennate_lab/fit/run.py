@@ -224,7 +224,7 @@ def _start(
 
     Gains and delays alone are searched: inertia and friction would make up for a wrong gain.
     """
-    light = [c for c in air if len(moving(c)) > 1] or air[:1]
+    light = [c for c in air if len(j := moving(c)) and j[0] >= robot.yaw_count] or air[:1]
     few = [each for each in chosen if each.path.endswith(("gain_divisor", "delay"))]
     found = []
     for gain in _GAINS:
