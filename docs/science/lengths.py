@@ -151,8 +151,17 @@ def table() -> None:
         for name, cells in tunnels.items()
         for controller, rows in cells.items()
     }
+    valid = {
+        (name, controller): np.array([row["outcome"] != "invalid" for row in rows])
+        for name, cells in tunnels.items()
+        for controller, rows in cells.items()
+    }
     others = [key for key in crossed if key[0] != "0.12"]
-    pairs = [mcnemar(np.stack([crossed["0.12", c], crossed[n, c]], axis=1)) for n, c in others]
+    both = {(n, c): valid["0.12", c] & valid[n, c] for n, c in others}
+    pairs = [
+        mcnemar(np.stack([crossed["0.12", c], crossed[n, c]], axis=1)[both[n, c]])
+        for n, c in others
+    ]
     raised = dict(zip(others, holm([pair.mcnemar_p for pair in pairs]), strict=True))
     heads = ("antenna", "base at the wall", *PROFILES, "largest hinge, descending")
     heads = (*heads, *(f"tunnel, `{c}`" for c in CONTROLLERS))
@@ -164,10 +173,8 @@ def table() -> None:
         most = cell["descending"]["hinge_max_deg"]
         line = [words, f"{angle}°", *passed, f"{most:.0f}°"]
         for controller in CONTROLLERS:
-            rows, ok = tunnels[name][controller], crossed[name, controller]
-            lost = sum(row["outcome"] == "invalid" for row in rows)
             p = raised.get((name, controller))
-            text = ends(int(ok.sum()), len(ok) - lost)
+            text = ends(int(crossed[name, controller].sum()), int(valid[name, controller].sum()))
             line.append(text + (f", p = {p:.2g}" if p is not None else ""))
         lines.append(f"| {' | '.join(line)} |")
     page = HERE / "corridors.md"
