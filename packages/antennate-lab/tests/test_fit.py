@@ -17,7 +17,7 @@ import pytest
 from protocol_logs import CONTROL, sweeps, write
 from scipy import signal
 
-from antennate.control.protocol import Protocol, Step
+from antennate.control.protocol import Protocol, Step, targets
 from antennate.errors import BadInputError, LogError
 from antennate.hardware.config import RobotConfig
 from antennate.params.scene import HookParams
@@ -26,7 +26,7 @@ from antennate.studies.pool import Workers
 from antennate.types import Floats
 from antennate_lab.fit import least_squares, measures, recording, regression, robot_file
 from antennate_lab.fit.config import FitConfig
-from antennate_lab.fit.estimates import Estimate
+from antennate_lab.fit.estimates import Estimate, of_air
 from antennate_lab.fit.experiment import sentence
 from antennate_lab.fit.parameters import LEG, SCALES, changed, parameters
 from antennate_lab.fit.result import FitResult, StepRow
@@ -80,6 +80,35 @@ def test_numbers_of_a_joint_alone_are_those_of_a_formula(tmp_path: Path) -> None
     covariance, draws = least_squares.covariances(problem, solution, np.random.default_rng(1))
     assert (np.sqrt(np.diag(covariance)) < [0.01, 1e-3, 0.1]).all()
     assert (draws.std(axis=0) < [0.01, 1e-3, 0.1]).all()
+    gain, delay, _ = of_air(problem, solution, covariance, draws)
+    assert gain.interval[0] < GAIN < gain.interval[1]
+    assert delay.interval[0] < DELAY < delay.interval[1]  # by its floor: noise is a tenth of it
+
+
+@pytest.mark.parametrize("amplitude", [0.5, 0.1])
+def test_interval_is_not_shorter_than_what_no_noise_shows(tmp_path: Path, amplitude: float) -> None:
+    """1.645 / √3 of: a timestep of 2 ms, half of 2π/4096 rad times 6.85 N·m/rad, 1 % and rounding.
+
+    The stiffness is that of the servo as it is shipped, 1.7 N·m times its gain.
+    """
+    sweep = sweeps(SMALL, "leg_l0", seconds=2.0).steps[0]
+    sweep = sweep.model_copy(update={"amplitude": amplitude})
+    swing = np.ptp(targets(sweep, SMALL, CONTROL), axis=0).max() / 2
+    protocol = Protocol(steps=(sweep,))
+    path = write(tmp_path / "drive.mcap", SMALL, protocol)
+    names = [f"servos.xc430_w240.{name}" for name in ("delay", "friction", "armature")]
+    chosen = parameters(SMALL, [(name, None) for name in names])
+    courses = recording.read(path, SMALL).courses
+    problem = least_squares.Problem(SMALL, courses, chosen, Workers(1))
+    x = problem.start + np.array([0.02, 0.1, 0.0])
+    solution = least_squares.Solution(x, 1.0, [], [])
+    found = of_air(problem, solution, np.zeros((3, 3)), np.zeros((2, 3)))
+    unit, share = math.pi / 4096, 1.645 / math.sqrt(3)
+    delay, friction = ((each.interval[1] - each.interval[0]) / 2 for each in found[:2])
+    assert delay == pytest.approx(share * 0.002, rel=1e-6)
+    assert friction == pytest.approx(share * unit * 6.848, rel=1e-3)
+    ratio = math.log(found[2].interval[1] / found[2].interval[0]) / 2
+    assert ratio == pytest.approx(share * math.hypot(0.01, unit / swing), rel=1e-3)
 
 
 def test_lag_is_the_shift_of_a_sine() -> None:

@@ -1,4 +1,8 @@
-"""What is known of each parameter in the end: value, interval, and whether the logs tell it."""
+"""What is known of each parameter in the end: value, interval, and whether the logs tell it.
+
+An interval in the air holds the noise of the log, and what no log shows because the model and its
+numerics leave it out (`floors`). The two are independent, so their variances add.
+"""
 
 from __future__ import annotations
 
@@ -11,9 +15,10 @@ import numpy as np
 from antennate.robots.spec import RobotSpec
 from antennate.types import Floats
 from antennate_lab.fit.least_squares import Problem, Solution
-from antennate_lab.fit.parameters import Parameter, bounds, parameters
+from antennate_lab.fit.parameters import BACKLASH, Parameter, bounds, parameters
 from antennate_lab.fit.regression import Known, Told
 from antennate_lab.fit.result import Correlation, ParameterRow
+from dynamixel_bus.model import POSITION_UNIT
 
 LEVEL = 1.645
 """Half the width of a 90 % interval of a normal distribution [standard deviations]."""
@@ -21,6 +26,11 @@ TOLD = 0.5
 """A parameter is told if its interval is narrower than this share of what was known before."""
 SHORTEST = 0.002
 """Delays up to the timestep of the physics are alike [s]."""
+SHARE = 0.01
+"""Share of its value by which a gain, an inertia, a spring or a factor may be off because the model
+leaves something out (assumed)."""
+ROUNDING = POSITION_UNIT / 2.0
+"""What the rounding of an angle hides [rad]."""
 _DRAWS = 4000
 _MOST = 8
 _LEAST = 0.5
@@ -75,8 +85,9 @@ class Estimate:
 def of_air(
     problem: Problem, solution: Solution, covariance: Floats, draws: Floats
 ) -> list[Estimate]:
-    """Estimates by least squares; the wider one of the Hessian's and the bootstrap's interval."""
-    sd = np.maximum(np.sqrt(np.diag(covariance)), draws.std(axis=0))
+    """Estimates by least squares; the wider one of Hessian and bootstrap, and the floor."""
+    noise = np.maximum(np.sqrt(np.diag(covariance)), draws.std(axis=0))
+    sd = np.hypot(noise, floors(problem, solution.x))
     low, high = bounds(problem.chosen)
     found, swept = [], problem.swept()
     for p, each in enumerate(problem.chosen):
@@ -91,6 +102,31 @@ def of_air(
         errors = draws[:, p] * sd[p] / max(draws[:, p].std(), 1e-12)
         found.append(Estimate(each, value, interval, told, "air", errors))
     return found
+
+
+def floors(problem: Problem, x: Floats) -> Floats:
+    """Standard deviations of what noise does not show, on the scale of the search, shape (P,).
+
+    Each has a limit within which all values are alike: of a delay the timestep, of a backlash
+    `ROUNDING`, of a friction the torque by which the servo answers to that. All others have a share
+    of the value, `SHARE` and `ROUNDING` over the largest swing of the steps that tell it. A limit
+    is that of a rectangular distribution, sd = limit / √3 (JCGM 100:2008, 4.3.7).
+    """
+    robot = problem.made(x)
+    swings = np.array([np.ptp(course.commands, axis=0).max() / 2.0 for course in problem.courses])
+    limits = []
+    for each, told in zip(problem.chosen, problem.told.T, strict=True):
+        *_, group, name = each.path.split(".")
+        if name == "delay":
+            limits.append(SHORTEST)
+        elif each.path == BACKLASH:
+            limits.append(ROUNDING)
+        elif name == "friction":
+            limits.append(ROUNDING * robot.servos.of(group).stiffness)
+        else:
+            swing = float(swings[told].max(initial=1e-9))
+            limits.append(float(np.hypot(SHARE, ROUNDING / swing)))
+    return np.array(limits) / 3.0**0.5
 
 
 def of_legs(robot: RobotSpec, legs: Told, prior: Known, rng: np.random.Generator) -> list[Estimate]:
