@@ -18,6 +18,7 @@ from antennate.cli import main
 from antennate.cli.doctor import VIEW
 from antennate.control.protocol import Step
 from antennate.errors import BadInputError
+from antennate.params.scene import HookParams
 from antennate.robots.spec import RobotSpec
 from antennate.types import Floats
 from antennate_lab.fit import compare
@@ -52,7 +53,7 @@ def compared(folder: Path, **numbers: float) -> compare.Row:
 
     def measured(step: Step, goals: Floats) -> Floats:
         none = np.zeros((len(goals), 0))
-        course = Course(step.called, True, CONTROL.period, 0.0, goals, goals, none, none)
+        course = Course(step.called, HookParams(), CONTROL.period, 0.0, goals, goals, none, none)
         return simulated(truth, course).positions
 
     log = write(folder / "drive.mcap", SMALL, sweeps(SMALL, "leg_l0"), measured)
