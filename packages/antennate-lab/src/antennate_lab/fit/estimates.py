@@ -109,8 +109,9 @@ def floors(problem: Problem, x: Floats) -> Floats:
 
     Each has a limit within which all values are alike: of a delay the timestep, of a backlash
     `ROUNDING`, of a friction the torque by which the servo answers to that. All others have a share
-    of the value, `SHARE` and `ROUNDING` over the largest swing of the steps that tell it. A limit
-    is that of a rectangular distribution, sd = limit / √3 (JCGM 100:2008, 4.3.7).
+    of the value (load friction: of the load), `SHARE` and `ROUNDING` over the largest swing of the
+    steps that tell it. A limit is that of a rectangular distribution, sd = limit / √3 (JCGM
+    100:2008, 4.3.7).
     """
     robot = problem.made(x)
     swings = np.array([np.ptp(course.commands, axis=0).max() / 2.0 for course in problem.courses])
