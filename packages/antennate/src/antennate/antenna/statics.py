@@ -47,6 +47,8 @@ _LOAD_STEPS = 24
 _ITERATIONS = 40
 _TOLERANCE = 1e-10
 """Residual torque over stiffness at which a load counts as solved [rad]."""
+_FORCES = 100
+"""Forces among which the first that is too large is looked for, before bisection."""
 _LARGEST_STEP = 0.3
 """Most that one Newton step turns a hinge [rad]."""
 
@@ -244,17 +246,53 @@ def _matched_coils(antenna: AntennaSpec) -> float:
     return low
 
 
-def largest_force(chain: Chain, limit: float | Floats) -> float:
-    """Force normal to the tip that turns the first hinge by its limit, by bisection [N].
+def pushed_at_tip(chain: Chain, forces: Floats) -> Rest:
+    """The one rest of a chain under each force on its tip that stays normal to the last link.
+
+    Seen from the last link the force is fixed, so angles follow one another from tip to base:
+    k_j q_j = f sum over i >= j of d_i cos(q_(i+1) + ... + q_n).
 
     Args:
-        chain: The chain, bent on the branch that begins straight.
+        chain: The chain.
+        forces: Forces [N], shape (m,).
+    """
+    angles = np.zeros((len(forces), len(chain.lengths)))
+    lever, aside, turned = np.zeros((3, len(forces)))
+    slope = np.zeros((*angles.shape, len(chain.lengths)))
+    for j, (length, stiffness) in reversed(
+        [*enumerate(zip(chain.lengths, chain.stiffness, strict=True))]
+    ):
+        lever = lever + length * np.cos(turned)
+        aside = aside + length * np.sin(turned)
+        angles[:, j] = forces * lever / stiffness
+        turned = turned + angles[:, j]
+        slope[:, j, :] += (forces * aside)[:, None]
+        slope[:, :, j] -= (forces * aside)[:, None]
+    slope = np.triu(slope) + np.diag(chain.stiffness)
+    stable = np.linalg.eigvalsh((slope + slope.swapaxes(1, 2)) / 2)[:, 0] > 0
+    force = np.stack([-forces * np.sin(turned), forces * np.cos(turned)], axis=1)
+    return Rest(angles, force, np.ones(len(forces), bool), stable)
+
+
+def largest_force(chain: Chain, limit: float | Floats) -> float:
+    """Largest force on the tip, normal to the last link and turning with it [N].
+
+    With any smaller one the chain is stable and no hinge turns beyond its limit.
+
+    Args:
+        chain: The chain.
         limit: Angle of all hinges, or of each, shape (n,) [rad].
     """
-    most = float(np.max(limit))
-    low, high = 0.0, 4.0 * most * float(chain.stiffness.max()) / float(chain.lengths.min())
-    while high - low > 1e-9 * high:
-        middle = (low + high) / 2
-        rest = equilibrium(chain, np.array([chain.length]), np.array([[0.0, middle]]), True)
-        low, high = (middle, high) if bool((abs(rest.angles[0]) < limit).all()) else (low, middle)
+    stiffness, starts = chain.stiffness, chain.starts
+    levers = (chain.length - starts) / (limit * stiffness)
+    rows = abs(starts[:, None] - starts).sum(axis=1) / (2.0 * stiffness)
+    low = 1.0 / float(max(levers.max(), rows.max()))  # no lever is longer; Gershgorin's circles
+    high = float((limit * stiffness)[-1] / chain.lengths[-1])  # turns the last hinge by its limit
+    many = _FORCES
+    while high - low > 1e-12 * high:
+        forces = np.geomspace(low, high, many)
+        rest = pushed_at_tip(chain, forces)
+        borne = rest.stable & (abs(rest.angles) < limit).all(axis=1)
+        first = max(1, int(np.argmin(borne)))
+        low, high, many = float(forces[first - 1]), float(forces[first]), 3
     return low

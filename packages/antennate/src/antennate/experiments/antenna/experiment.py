@@ -94,15 +94,16 @@ def _of_bending(found: Bending) -> Table:
 
 def borne(found: Bending) -> str:
     """The largest forces that an antenna bears on its tip, in one sentence."""
-    end = (
-        "the wire of spring {} yields"
-        if found.ends_by == "yield"
-        else ("hinge {} is at its stop; until then no wire yields")
-    )
+    end = {
+        "yield": f"the wire of spring {found.ends_at_hinge} yields",
+        "stop": f"hinge {found.ends_at_hinge} is at its stop",
+        "unstable": "its rest is not stable any more",
+    }[found.ends_by]
+    turned = f"before a hinge turns {found.angle_deg:g} deg"
+    first = f"{1e3 * found.bearable_n:.0f} mN {turned}, and " if found.bearable_n else ""
     return (
-        f"At the tip it bears {1e3 * found.bearable_n:.0f} mN before a hinge turns "
-        f"{found.angle_deg:g} deg, and {1e3 * found.sound_n:.0f} mN before "
-        f"{end.format(found.ends_at_hinge)}."
+        f"At the tip it bears {first}{1e3 * found.sound_n:.0f} mN before {end}"
+        f"{'' if first else f', which is {turned}'}. The force turns with the last link."
     )
 
 

@@ -51,18 +51,23 @@ def _of_bending(found: Bending) -> Figure:
     panels = figure.subplots(2, 1, sharex=True)
     colours = style.series(2)
     tip = [push.tip_mm for push in found.curve]
-    borne = np.interp(found.bearable_n, [push.force_n for push in found.curve], tip)
+    forces = [push.force_n for push in found.curve]
     for panel, name, scale, label, colour in (
         (panels[0], "force_n", 1e3, "force [mN]", colours[0]),
         (panels[1], "counts", 1.0, "reading [counts]", colours[1]),
     ):
-        panel.plot(tip, [scale * getattr(push, name) for push in found.curve], color=colour)
+        values = [scale * getattr(push, name) for push in found.curve]
+        panel.plot(tip, values, color=colour)
         panel.set(ylabel=label)
-        if found.bearable_n < found.curve[-1].force_n:
-            panel.axvline(borne, color=style.MUTED, linewidth=0.8)
+        if found.bearable_n:
+            at = [np.interp(found.bearable_n, forces, line) for line in (tip, values)]
+            panel.plot(*at, color=style.INK, marker="o", linestyle="")
+    turned = (
+        f"; dot: {1e3 * (found.bearable_n or 0.0):.0f} mN, a hinge turns {found.angle_deg:g} deg"
+    )
+    end = "not stable beyond" if found.ends_by == "unstable" else f"then {found.ends_by}"
     panels[0].set_title(
-        f"Bears {1e3 * found.bearable_n:.0f} mN up to {found.angle_deg:g} deg a hinge,\n"
-        f"{1e3 * found.sound_n:.0f} mN up to the first {found.ends_by}"
+        f"Up to {1e3 * found.sound_n:.0f} mN, {end}{turned if found.bearable_n else ''}"
     )
     panels[1].set(xlabel="tip aside [mm]", xlim=(0, None))
     return figure

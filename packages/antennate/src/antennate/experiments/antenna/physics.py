@@ -11,7 +11,7 @@ import numpy as np
 
 from antennate.antenna import sensor, springs
 from antennate.antenna.dynamics import LinearChain, Mode, fitted_mode
-from antennate.antenna.statics import Chain, equilibrium, largest_force, shape
+from antennate.antenna.statics import Chain, largest_force, pushed_at_tip, shape
 from antennate.errors import ConfigError
 from antennate.experiments.antenna.config import AntennaConfig
 from antennate.experiments.antenna.result import (
@@ -40,8 +40,6 @@ E24 = (
     *(3.3, 3.6, 3.9, 4.3, 4.7, 5.1, 5.6, 6.2, 6.8, 7.5, 8.2, 9.1),
 )
 """Resistors to be had in each decade (IEC 60063, series E24)."""
-_FORCES = 400
-"""Forces among which the one is looked for that moves the tip farthest."""
 ANIMAL_CYCLE = 0.05
 """Cycle in which a cockroach's antenna loses over 90 % of a deflection [s] (Mongeau 2014)."""
 
@@ -230,12 +228,12 @@ def bending_of(config: AntennaConfig) -> Bending:
     limits = np.minimum(yields, antenna.range)
     bearable = largest_force(chain, math.radians(config.angle_deg))
     sound = largest_force(chain, limits)
-    bent, _ = _pushed(chain, np.array([sound]))
-    first = int(np.argmax(abs(bent[0]) / limits))
-    forces = np.linspace(0.0, sound, _FORCES)
-    farthest = forces[int(np.argmax(_pushed(chain, forces)[1]))]
-    forces = np.linspace(0.0, farthest, config.points)
-    angles, tip = _pushed(chain, forces)
+    forces = np.linspace(0.0, sound, config.points)
+    angles = pushed_at_tip(chain, forces).angles
+    tip = shape(chain, angles)[:, -1, 1]
+    reached = abs(angles[-1]) / limits
+    first = int(np.argmax(reached))
+    unstable = reached[first] < 1.0 - 1e-6
     flex = angles[:, : antenna.sensed_hinges].sum(axis=1)
     most = abs(angles).max(axis=1)
     counts = sensor.counts(antenna.sensor, flex)
@@ -243,19 +241,12 @@ def bending_of(config: AntennaConfig) -> Bending:
     names = ("tip_mm", "force_n", "most_bent_deg", "flex_deg", "counts")
     return Bending(
         curve=[Pushed(**dict(zip(names, map(float, row), strict=True))) for row in rows],
-        bearable_n=bearable,
+        bearable_n=bearable if bearable < sound * (1.0 - 1e-9) else None,
         angle_deg=config.angle_deg,
         sound_n=sound,
-        ends_by="yield" if yields[first] < antenna.range else "stop",
-        ends_at_hinge=first + 1,
+        ends_by="unstable" if unstable else "yield" if yields[first] < antenna.range else "stop",
+        ends_at_hinge=None if unstable else first + 1,
     )
-
-
-def _pushed(chain: Chain, forces: Floats) -> tuple[Floats, Floats]:
-    """Hinge angles [rad], shape (m, n), and how far the tip is aside [m], under forces (m,) [N]."""
-    force = np.stack([np.zeros_like(forces), forces], axis=1)
-    angles = equilibrium(chain, np.full(len(forces), chain.length), force, follower=True).angles
-    return angles, shape(chain, angles)[:, -1, 1]
 
 
 def ringdown_of(config: AntennaConfig) -> tuple[Ringdown, Trace]:

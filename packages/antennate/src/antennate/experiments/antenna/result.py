@@ -198,18 +198,17 @@ class Bending:
     """What a force on the tip does to the antenna."""
 
     curve: list[Pushed]
-    """Forces from none to the one at which the tip is farthest aside, or the first limit is
-    reached."""
-    bearable_n: float
-    """Largest force at which no hinge turns beyond `angle_deg`."""
+    """Forces from none to `sound_n`, normal to the last link. They turn with it."""
+    bearable_n: float | None
+    """Largest force at which no hinge turns beyond `angle_deg`; `null` if it exceeds `sound_n`."""
     angle_deg: float
     """Angle that a spring must bear."""
     sound_n: float
-    """Largest force at which no wire yields and no hinge is at its stop."""
+    """Largest force at which no wire yields, no hinge is at its stop, and the rest is stable."""
     ends_by: str
-    """What the next larger force does: `yield` of a wire, or `stop` of a hinge."""
-    ends_at_hinge: int
-    """Which hinge that is, 1 at the base."""
+    """What the next larger force does: `yield` of a wire, `stop` of a hinge, or `unstable`."""
+    ends_at_hinge: int | None
+    """Which hinge yields or stops, 1 at the base; `null` if the rest is unstable."""
 
 
 @tabular
