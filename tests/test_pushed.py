@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -110,6 +111,21 @@ def test_the_drawing_is_to_scale(coils: tuple[float, ...]) -> None:
     texts = {text.get_text() for text in axes.texts}
     assert {"90.0", f"{90 / len(coils):.1f}", "flex sensor 90.0"} <= texts
     assert (f"{coils[-1]:g} coils\n{WIRE * (coils[-1] + 1):.1f} tall" in texts) == (len(coils) < 13)
+
+
+def test_coils_that_overlap_are_told_and_many_springs_fit_the_figures(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """60 hinges over 120 mm stand 2 mm apart, coils of 0.5 mm wire are 4.27 mm wide."""
+    Path(tmp_path / "many.toml").write_text(f"length = 0.12\nactive_coils = {[9.0] * 60}\n")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert main(["antenna", str(tmp_path / "many.toml"), "--out", str(tmp_path / "out")]) == 0
+    line = "Coils overlap: they are 4.27 mm wide, hinges are 2.00 mm apart."
+    assert line in " ".join(capsys.readouterr().out.split())
+    assert line in (tmp_path / "out" / "figures" / "drawing.svg").read_text()
+    texts = [text.get_text() for text in drawing(AntennaConfig()).axes[0].texts]
+    assert not any("overlap" in text for text in texts)
 
 
 def test_the_command_draws_and_says_what_the_antenna_bears(

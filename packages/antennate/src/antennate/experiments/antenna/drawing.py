@@ -8,6 +8,7 @@ from matplotlib.patches import Circle, Rectangle
 
 from antennate import figures as style
 from antennate.experiments.antenna.config import AntennaConfig
+from antennate.experiments.antenna.result import overlap
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -48,7 +49,9 @@ def drawing(config: AntennaConfig) -> Figure:
     coil = f"wire {config.wire_mm:g}, coils {config.coil_mm:g} in the middle"
     title = f"from the side; links {thick:g} thick; {coil} [mm]"
     axes.text(0.0, side + high / 2 + 4.0 * _ROOM, title, fontsize=_LETTERS + 1)
-    axes.text(0.0, high / 2 + 0.5 * _ROOM, "from above: the plane in which it bends", fontsize=8)
+    plane = "from above: the plane in which it bends"
+    plane += overlap(config.coil_mm + config.wire_mm, ends[1])
+    axes.text(0.0, high / 2 + 0.5 * _ROOM, plane, fontsize=8)
     return figure
 
 

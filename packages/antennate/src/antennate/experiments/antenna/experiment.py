@@ -26,6 +26,7 @@ from antennate.experiments.antenna.result import (
     Springs,
     Swing,
     Taper,
+    overlap,
 )
 from antennate.studies.columns import columns, shown
 from antennate.studies.experiment import Experiment, RunOutcome
@@ -119,7 +120,7 @@ def _of_springs(found: Springs) -> tuple[Table, Table]:
         "Springs",
         {f"{spring.active_coils:g} coils": spring for spring in found.springs},
         note=f"Spring index {found.spring_index:.1f}. Stiffness goes with 1 / coils; the paper "
-        "rounds its table.",
+        f"rounds its table.{overlap(found.coil_outer_mm, found.hinge_distance_mm)}",
     )
     wound = Table.of(
         "Sets to wind",

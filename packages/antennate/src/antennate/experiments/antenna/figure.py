@@ -46,7 +46,7 @@ def figures(outcome: AntennaOutcome) -> dict[str, Figure]:
 
 
 def _of_bending(found: Bending) -> Figure:
-    """Force and reading over the tip's deflection, and where a hinge turns too far."""
+    """Force and reading over the tip's deflection, up to the last force that is borne."""
     figure = style.canvas(style.WIDTH, 4.6)
     panels = figure.subplots(2, 1, sharex=True)
     colours = style.series(2)
@@ -62,13 +62,10 @@ def _of_bending(found: Bending) -> Figure:
         if found.bearable_n:
             at = [np.interp(found.bearable_n, forces, line) for line in (tip, values)]
             panel.plot(*at, color=style.INK, marker="o", linestyle="")
-    turned = (
-        f"; dot: {1e3 * (found.bearable_n or 0.0):.0f} mN, a hinge turns {found.angle_deg:g} deg"
-    )
-    end = "not stable beyond" if found.ends_by == "unstable" else f"then {found.ends_by}"
-    panels[0].set_title(
-        f"Up to {1e3 * found.sound_n:.0f} mN, {end}{turned if found.bearable_n else ''}"
-    )
+    title = f"Up to {1e3 * found.sound_n:.0f} mN, beyond: {found.ends_by}"
+    if found.bearable_n:
+        title += f"\ndot: {1e3 * found.bearable_n:.0f} mN turn a hinge by {found.angle_deg:g} deg"
+    panels[0].set_title(title)
     panels[1].set(xlabel="tip aside [mm]", xlim=(0, None))
     return figure
 

@@ -91,6 +91,8 @@ def springs_of(config: AntennaConfig) -> Springs:
     wanted = tuple(k * N_MM_PER_DEG for k in config.wanted_n_mm_per_deg)
     return Springs(
         spring_index=(1e-3 * config.coil_mm) / (1e-3 * wire),
+        coil_outer_mm=config.coil_mm + wire,
+        hinge_distance_mm=1e3 * config.antenna.link_length,
         springs=[_spring(config, coils) for coils in sorted({*config.antenna.active_coils})],
         wanted_n_mm_per_deg=list(config.wanted_n_mm_per_deg),
         windings=[

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from antennate.studies.columns import column, percent, tabular
 
 
@@ -55,6 +57,10 @@ class Springs:
 
     spring_index: float
     """Mean diameter of the coils over that of the wire."""
+    coil_outer_mm: float
+    """Outer diameter of the coils. They overlap if it exceeds `hinge_distance_mm`."""
+    hinge_distance_mm: float
+    """Distance of a hinge from the next."""
     springs: list[Spring]
     """Springs, one for each count of active coils."""
     wanted_n_mm_per_deg: list[float]
@@ -78,8 +84,9 @@ class Ladder:
 
     @property
     def name(self) -> str:
-        """Coils as tables and figures name them."""
-        return "-".join(f"{n:g}" for n in self.active_coils)
+        """Coils as tables and figures name them, or the number of springs where there are many."""
+        many = len(self.active_coils)
+        return "-".join(f"{n:g}" for n in self.active_coils) if many <= 12 else f"{many} springs"
 
 
 @tabular
@@ -229,3 +236,10 @@ class AntennaResult:
     """The antenna after it is let go."""
     bending: Bending
     """The antenna under a force on its tip."""
+
+
+def overlap(coil: float, distance: float) -> str:
+    """A line if coils of an outer diameter overlap at this distance of hinges [mm], else none."""
+    if coil <= distance or math.isclose(coil, distance):
+        return ""
+    return f"\nCoils overlap: they are {coil:.2f} mm wide, hinges are {distance:.2f} mm apart."
