@@ -24,7 +24,7 @@ from antennate.params.scene import HookParams
 from antennate.robots.spec import RobotSpec
 from antennate.studies.pool import Workers
 from antennate.types import Floats
-from antennate_lab.fit import least_squares, measures, recording, regression, robot_file
+from antennate_lab.fit import compare, least_squares, measures, recording, regression, robot_file
 from antennate_lab.fit.config import FitConfig
 from antennate_lab.fit.estimates import Estimate, of_air
 from antennate_lab.fit.experiment import sentence
@@ -171,6 +171,29 @@ def test_log_of_another_robot_is_refused(tmp_path: Path) -> None:
     )
     with pytest.raises(BadInputError, match="servo_names xl430_w250, found xc430_w240"):
         recording.read(path, other)
+
+
+def test_log_and_robot_have_an_inertial_sensor_or_neither(
+    tmp_path: Path, refused: Callable[..., str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """One line before any work, of the fit and of the doctor."""
+    monkeypatch.chdir(tmp_path)
+    bare = RobotSpec()
+    felt = RobotSpec(imu={"kind": "head"})  # type: ignore[arg-type]
+    log = write(tmp_path / "felt.mcap", felt, sweeps(felt, "leg_l0"))
+    words = "felt.mcap: the log has an inertial sensor, the robot file none: set imu in it"
+    assert words in refused("fit", log, "--robot", "scuttle")
+    own = tmp_path / "own.toml"
+    own.write_text(
+        '[[fitted]]\nname = "servos.xc430_w240.delay"\nlow = 0.0\nhigh = 0.01\nsource = "test"\n'
+    )
+    with pytest.raises(BadInputError, match=words):
+        compare.rows(own, log)
+    other = write(tmp_path / "bare.mcap", bare, sweeps(bare, "leg_l0"))
+    with pytest.raises(BadInputError, match="the robot file has an inertial sensor, the log none"):
+        recording.read(other, felt)
+    assert recording.read(log, felt).courses
+    assert recording.read(other, bare).courses
 
 
 def test_command_refuses_the_log_of_another_robot(

@@ -140,7 +140,7 @@ def _gyro_zero(courses: list[Course]) -> Floats:
 
 
 def _require_same(path: Path, logged: RobotSpec, robot: RobotSpec) -> None:
-    """Refuse the log of a robot with other joints or servos."""
+    """Refuse the log of a robot with other joints or servos, or another inertial sensor."""
     for name in _PARTS:
         ours, theirs = getattr(robot, name), getattr(logged, name)
         if ours != theirs:
@@ -148,6 +148,14 @@ def _require_same(path: Path, logged: RobotSpec, robot: RobotSpec) -> None:
                 f"{path}: expected the robot of the file with {name} {_shown(ours, theirs)}, found "
                 f"{_shown(theirs, ours)}; give the file of the robot that was driven"
             )
+    if logged.has_imu and not robot.has_imu:
+        raise BadInputError(
+            f"{path}: the log has an inertial sensor, the robot file none: set imu in it"
+        )
+    if robot.has_imu and not logged.has_imu:
+        raise BadInputError(
+            f"{path}: the robot file has an inertial sensor, the log none: take imu out of it"
+        )
 
 
 def _shown(value: object, other: object) -> str:
