@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import shlex
 from collections.abc import Callable
 from pathlib import Path
 
@@ -9,6 +11,7 @@ import pytest
 from servo_recordings import found_of, of_twin, written
 
 import antennate
+from antennate.cli import main
 from antennate.robots.servos import XL330Params
 from antennate.robots.spec import RobotSpec
 from antennate_lab.fit.servo_recordings import ServoFit
@@ -54,6 +57,22 @@ def test_servo_of_the_twin_is_found_from_two_recordings(tmp_path: Path) -> None:
     assert [step.step for step in fit.result().steps] == ["gain 300", "gain 500"]
     for step in fit.result().steps:
         assert step.error_deg < 0.2 < step.error_before_deg
+
+
+def test_command_that_is_printed_names_the_file_that_was_written(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """From where the fit ran the path can be given, a blank in it too."""
+    monkeypatch.chdir(tmp_path)
+    files = [of_twin(tmp_path / f"{gain}.json", 1200, gain, 1.0, 2.0) for gain in (300, 500)]
+    words = ("--servo", "xl330_m288", "--no-figures", "--out", "my fit")
+    assert main(["fit", *map(str, files), *words]) == 0
+    headline = " ".join(capsys.readouterr().out.split())
+    told = json.loads(Path("my fit/result.json").read_text(encoding="utf-8"))["simulate"]
+    assert f"To simulate the robot: {told}" in headline
+    *_, command, flag, robot = shlex.split(told)
+    assert (command, flag, robot) == ("tunnel", "--robot", "my fit/robot.toml")
+    assert RobotSpec.named(robot).fitted
 
 
 @pytest.mark.parametrize(

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
+from antennate.messages import typed
 from antennate.studies.columns import Column, column_of, columns
 from antennate.studies.experiment import Experiment
 from antennate.studies.tables import Table
@@ -86,6 +88,9 @@ EXPERIMENT = Experiment.of_folder(
     result=FitResult,
     row=ParameterRow,
     files=lambda config: {ROBOT: _robot},
+    placed=lambda found, folder: replace(
+        found, simulate=typed("tunnel", "--robot", str(folder / ROBOT))
+    ),
     captions={
         "steps": "Left: each step's error of angles with the robot before (open) and the fitted "
         "one (filled); steps that the fit did not see are red. Right: a walk that it did not see.",

@@ -373,7 +373,7 @@ def _end(
     argv: Sequence[str] | None,
 ) -> int:
     """Keep what came out, print it, and make the films; `argv` can be given again to go on."""
-    found, title = outcome.result(), experiment.view.title
+    found, title = experiment.placed(outcome.result(), run.path), experiment.view.title
     explained = "docs/results.md" if is_explained(experiment) else ""
     result = experiment.content(found)
     interrupted = bool(result.get("interrupted"))

@@ -74,7 +74,8 @@ class Result:
     @property
     def found(self) -> Any:
         """What it came to, an object with the fields of result.json, see docs/results.md."""
-        return self.outcome.result()
+        found = self.outcome.result()
+        return found if self.path is None else self.experiment.placed(found, self.path)
 
     @property
     def summary(self) -> dict[str, Any]:
@@ -186,7 +187,8 @@ def run(
         directory.describe(config)
         pool = replace(pool, trials=directory.trials)
         outcome = experiment.run(config, pool, on_step, directory.append)
-        keep(experiment, config, outcome, experiment.content(outcome.result()), directory)
+        found = experiment.placed(outcome.result(), directory.path)
+        keep(experiment, config, outcome, experiment.content(found), directory)
         if video is not None:
             write_films(experiment, config, video, directory)
         write_report(directory, experiment.view)

@@ -127,6 +127,7 @@ class Experiment(Generic[Config, Out]):
             if there are no controllers to log.
         films: films(config, trial) -> by condition a function that runs this trial once more and
             records it; None where nothing can be filmed.
+        placed: placed(result, folder) -> the result of a run in that folder, if it names its files.
         body: body(result, images) -> HTML that stands in its report in place of tables and figures.
         workers: Where its trials may run: none (it has no trials on workers), here (processes of
             this machine) or anywhere (on other machines, too).
@@ -153,6 +154,7 @@ class Experiment(Generic[Config, Out]):
     settled: Callable[[Config, Path | None], Config] = lambda config, folder: config
     logs: Callable[[Config], Sequence[str]] | None = None
     films: Callable[[Config, int], Mapping[str, Callable[[], Film]]] | None = None
+    placed: Callable[[Any, Path], Any] = lambda found, folder: found
     body: Callable[[Any, Mapping[str, str]], str] | None = None
     workers: Literal["none", "here", "anywhere"] = "anywhere"
     tasks: Callable[[Config], Sequence[Any]] | None = None
