@@ -196,7 +196,7 @@ def judged(folder: Path, seed: int, number: int, workers: int) -> None:
         path, _, place = row.name.partition("[")
         at = int(place[:-1]) if place else None
         truth = parameters(robot, [(path, at)])[0].start
-        low, high = row.interval_90
+        low, high = row.low, row.high
         holds = low <= truth <= high
         known = {"robot": number, "name": row.name, "told": row.told, "before": row.before}
         numbers.append(

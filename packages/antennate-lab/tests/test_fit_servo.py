@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import json
 import shlex
 from collections.abc import Callable
@@ -51,7 +52,11 @@ def test_servo_of_the_twin_is_found_from_two_recordings(tmp_path: Path) -> None:
         f"{SERVO}.stall_torque stays 0.7, though the others were found with {true.datasheet[0]:g}"
     )
     assert {each.name for each in robot.fitted} == {f"{SERVO}.{name}" for name in NUMBERS}
+    with (tmp_path / "out/trials.csv").open(encoding="utf-8", newline="") as file:
+        table = {row["name"]: (row["low"], row["high"]) for row in csv.DictReader(file)}
     for each in robot.fitted:
+        ends = [float(f"{float(end):.5g}") for end in table[each.name]]
+        assert ends == [each.low, each.high]
         assert each.low <= rows[each.name.rpartition(".")[2]].value <= each.high
         assert each.source == "measured: fit of 300.json, 500.json"
     assert [step.step for step in fit.result().steps] == ["gain 300", "gain 500"]
@@ -91,6 +96,19 @@ def test_command_that_is_printed_names_the_file_that_was_written(
             "servo: expected the default, as logs do not read it",
         ),
         (("log.mcap", "left.CSV"), (), "left.CSV: expected logs of `drive --protocol` or"),
+        (
+            ("a.json", "left.CSV"),
+            ("--servo", "xl330_m288"),
+            "recordings of a servo (JSON), found a CSV table, which is not read here",
+        ),
+        (("bench",), ("--servo", "xl330_m288"), "bench: expected recordings of a servo (JSON)"),
+        (("a.json", "random.json"), (), "random.json: expected a recording of a servo (JSON)"),
+        (
+            ("random.json", "a.json"),
+            ("--servo", "xl330_m288"),
+            "random.json: expected a recording of a servo (JSON)",
+        ),
+        (("random.json",), (), "random.json: expected a recording of a servo (JSON)"),
         (("bad.json", "b.json"), ("--servo", "xl330_m288"), "entry 0: expected a finite number"),
     ],
 )
@@ -102,8 +120,10 @@ def test_what_cannot_be_fitted_is_refused_in_one_line(
     refused: Callable[..., str],
 ) -> None:
     """Recordings, logs and tables are told apart by their content, and no flag is ignored."""
-    for name, text in (("bad.json", "{}"), ("log.mcap", "MCAP"), ("left.CSV", "counts,bend")):
-        (tmp_path / name).write_text(text)
+    (tmp_path / "bench").mkdir()
+    (tmp_path / "left.CSV").write_text("counts,bend")
+    (tmp_path / "log.mcap").write_bytes(b"\x89MCAP0\r\n")  # as the specification says
+    (tmp_path / "random.json").write_bytes(bytes(range(255, -1, -1)) * 20)
     entries = [{"timestamp": 0.004 * i, "goal_position": 0.0} for i in range(60)]
     for name in ("a.json", "b.json", "bad.json"):
         written(tmp_path / name, entries, 400)
@@ -142,7 +162,7 @@ def test_real_servo_has_the_numbers_of_servo_and_is_better_where_it_was_not_fitt
     for name, (low, high) in whole.interval_95.items():
         row = rows[f"{SERVO}.{name}"]
         assert row.value == pytest.approx(getattr(whole, name), rel=1e-9)
-        assert low < row.interval_90[0] < row.value < row.interval_90[1] < high
+        assert low < row.low < row.value < row.high < high
     steps = fit.result().steps
     assert [step.step for step in steps] == ["gain 200", "gain 400"]
     for step in steps:

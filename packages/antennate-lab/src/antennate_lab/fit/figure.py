@@ -73,7 +73,7 @@ def _intervals(outcome: FitOutcome | ServoFit) -> Figure:
     panel = figure.subplots()
     for y, row in enumerate(reversed(rows)):
         colour = _AFTER if row.told else style.FAINT
-        panel.plot([end / row.before for end in row.interval_90], [y, y], color=colour)
+        panel.plot([row.low / row.before, row.high / row.before], [y, y], color=colour)
         panel.plot(row.value / row.before, y, "o", color=colour, markersize=4)
     panel.axvline(1.0, color=style.MUTED, linewidth=0.8, linestyle=":")
     panel.set_yticks(range(len(rows)), [row.name for row in reversed(rows)], fontsize=7)

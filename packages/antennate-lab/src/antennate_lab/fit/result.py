@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from antennate.studies.columns import Ends, column, tabular
+from antennate.studies.columns import column, tabular
 
 
 @tabular
@@ -17,8 +17,10 @@ class ParameterRow:
     """Value in the robot's file."""
     value: float = column("fitted", form=".4g")
     """Value that predicts the logs best; the one before where they do not tell it."""
-    interval_90: Ends = column("90 %", form=".4g")
-    """Ends of the 90 % interval."""
+    low: float = column("90 % from", form=".4g")
+    """Lower end of the 90 % interval."""
+    high: float = column("to", form=".4g")
+    """Upper end."""
     told: bool
     """Whether that is narrower than half of what was known before."""
     by: str = column("by")

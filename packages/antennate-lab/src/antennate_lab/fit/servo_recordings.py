@@ -11,6 +11,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 from scipy.special import stdtrit
@@ -21,6 +22,7 @@ from antennate.jackknife import jackknife95
 from antennate.params.base import changes
 from antennate.robots.servos import MODEL_NUMBERS, ServosParams
 from antennate.studies.trials import OnStep, no_step
+from antennate.telemetry.chunks import MAGIC
 from antennate.types import Floats
 from antennate_lab.fit.config import FitConfig
 from antennate_lab.fit.estimates import LEVEL, TOLD, Estimate
@@ -35,19 +37,32 @@ _RECORD = "lift a known weight with this servo on a bench, at several gains"
 
 
 def are_given(config: FitConfig) -> bool:
-    """Whether the files are recordings of a servo, by their first character; False for logs.
+    """Whether the files are recordings of a servo, by their first bytes; False for logs.
 
     Raises:
-        BadInputError: Some are, or one is a table of readings, or a setting is of the other kind.
+        BadInputError: Some are, or one is neither, or a setting is of the other kind.
     """
-    tables = [name for name in config.log if Path(name).suffix.lower() == ".csv"]
-    if tables:
-        raise BadInputError(
-            f"{tables[0]}: expected logs of `drive --protocol` or recordings of a servo (JSON), "
-            "found a table: readings over bend set no number of a robot; `antennate calibrate "
-            "--recording FILE` fits their curve, and robot.toml names its file as `calibration`"
-        )
-    texts = [name for name in config.log if _is_json(Path(name))]
+    for name in config.log:
+        if Path(name).suffix.lower() == ".csv":
+            raise BadInputError(
+                f"{name}: expected logs of `drive --protocol` or recordings of a servo (JSON), "
+                "found a CSV table, which is not read here; if it holds readings of an antenna "
+                "over bend, `antennate calibrate --recording FILE` fits their curve, and "
+                "robot.toml names its file as `calibration`"
+            )
+        if config.servo is not None and Path(name).is_dir():
+            raise BadInputError(
+                f"{name}: expected recordings of a servo (JSON) beside --servo, found a folder; "
+                "name its files"
+            )
+    kinds = [(name, _kind(Path(name))) for name in config.log]
+    texts = [name for name, kind in kinds if kind == "recording"]
+    for name, kind in kinds:
+        json = texts or config.servo is not None or Path(name).suffix.lower() == ".json"
+        if kind == "neither" and json:
+            raise BadInputError(
+                f"{name}: expected a recording of a servo (JSON), found neither that nor a log"
+            )
     if texts and len(texts) < len(config.log):
         raise BadInputError(
             f"log: expected logs or recordings of a servo, found both, as {texts[0]}; fit one, "
@@ -63,12 +78,16 @@ def are_given(config: FitConfig) -> bool:
     return bool(texts)
 
 
-def _is_json(path: Path) -> bool:
+def _kind(path: Path) -> Literal["log", "recording", "neither"]:
+    """What a file is by its first bytes; by its name if its reader has to say why it cannot."""
     try:
         with open_regular(path) as file:
-            return file.read(64).lstrip(b"\xef\xbb\xbf \t\r\n")[:1] in (b"{", b"[")
+            first = file.read(64)
     except OSError:
-        return path.suffix.lower() == ".json"  # its reader says why
+        return "recording" if path.suffix.lower() == ".json" else "log"
+    if first.startswith(MAGIC):
+        return "log"
+    return "recording" if first.lstrip(b"\xef\xbb\xbf \t\r\n")[:1] in (b"{", b"[") else "neither"
 
 
 @dataclass(frozen=True)
