@@ -41,12 +41,14 @@ def fitted(folder: Path, text: str, **intervals: tuple[float, float]) -> Path:
     return path
 
 
-GAIN, FRICTION = "servos.xc430_w240.gain_divisor", "servos.xc430_w240.friction"
-KNOWN = {GAIN: (126.0, 130.0), FRICTION: (0.0, 0.002)}
+GAIN, FRICTION, DELAY = (f"servos.xc430_w240.{x}" for x in ("gain_divisor", "friction", "delay"))
+KNOWN = {GAIN: (126.0, 130.0), FRICTION: (0.0, 0.002), DELAY: (0.0, 0.002)}
 """Intervals about the numbers of a new robot."""
 
 
-def compared(folder: Path, **numbers: float) -> compare.Row:
+def compared(
+    folder: Path, known: dict[str, tuple[float, float]] | None = None, **numbers: float
+) -> compare.Row:
     """The row of the one joint of a log, its servo with other numbers than the file says."""
     servos = {"xc430_w240": SMALL.servos.xc430_w240.model_dump() | numbers}
     truth = RobotSpec.model_validate(SMALL.model_dump() | {"servos": servos})
@@ -57,10 +59,11 @@ def compared(folder: Path, **numbers: float) -> compare.Row:
         return simulated(truth, course).positions
 
     log = write(folder / "drive.mcap", SMALL, sweeps(SMALL, "leg_l0"), measured)
-    whole, row = compare.rows(fitted(folder, LEGGED, **KNOWN), log)
-    assert (whole.part, whole.grade) == ("log", "warn")
-    assert whole.found == "no sweep of yaw1, leg_r0, leg_l1, leg_r1"
-    assert (row.part, row.check) == ("joint", "leg_l0")
+    whole, *rows = compare.rows(fitted(folder, LEGGED, **(known or KNOWN)), log)
+    assert (whole.part, whole.grade) == ("log", "ok")
+    assert [row.check for row in rows] == ["yaw1", "leg_l0", "leg_r0", "leg_l1", "leg_r1"]
+    yaw, row, *others = rows
+    assert all((o.part, o.grade, o.found) == ("joint", "note", "none") for o in (yaw, *others))
     return row
 
 
@@ -94,6 +97,30 @@ def test_joint_that_was_changed_is_named(
     assert f"{name} not as fitted" in row.cure
 
 
+@pytest.mark.parametrize(
+    ("known", "absent"),
+    [
+        ({"servos.xl330_m288.gain_divisor": (120.0, 136.0)}, ["lag", "gain", "friction"]),
+        ({GAIN: (126.0, 130.0), FRICTION: (0.0, 0.002)}, ["lag"]),
+        ({DELAY: (0.0, 0.002)}, ["gain", "friction"]),
+    ],
+)
+def test_number_without_an_interval_is_never_as_fitted(
+    tmp_path: Path, known: dict[str, tuple[float, float]], absent: list[str]
+) -> None:
+    """Not even by the value that the file has, and the joint is none that behaves as fitted."""
+    row = compared(tmp_path, known)
+    assert row.grade == "note"
+    assert f"{' and '.join(absent)}: not in the file" in row.cure
+    for name in absent:
+        assert f"{name}: not in the file" in row.expected
+        assert name not in row.found
+    rows = [{"part": row.part, "grade": row.grade}]
+    assert VIEW.sentence({"rows": rows}) == (
+        "Of 1 joints 0 behave as fitted, 1 were not compared in full."
+    )
+
+
 def test_file_without_intervals_and_log_without_sweeps_are_refused(tmp_path: Path) -> None:
     log = write(tmp_path / "drive.mcap", SMALL, sweeps(SMALL, "leg_l0"))
     bare = fitted(tmp_path, LEGGED)
@@ -113,7 +140,7 @@ def test_sentence_counts_joints_that_changed_and_those_that_nothing_tells() -> N
     port = {"part": "bus", "grade": "ok"}
     grades = ("ok", "ok", "warn", "note")
     joints = [{"part": "log", "grade": "ok"}, *({"part": "joint", "grade": g} for g in grades)]
-    told = "Of 4 joints 2 behave as fitted, 1 do not, 1 the log does not tell."
+    told = "Of 4 joints 2 behave as fitted, 1 do not, 1 were not compared in full."
     assert VIEW.sentence({"rows": joints}) == told
     driven = "The robot may be driven: all 1 checks are good."
     assert VIEW.sentence({"rows": [port, *joints]}) == f"{driven} {told}"

@@ -2,7 +2,8 @@
 
 Each joint that is swept alone in the air is fitted by itself, from the fitted robot on
 (`least_squares`). It has changed if one of its numbers is out of its range: the interval of the
-robot's file, wider by what the sweep leaves open and by what joints of one model differ, `ALIKE`.
+robot's file, wider by what the sweep leaves open and by a margin, `ALIKE`. It is as fitted if all
+of its numbers have an interval and are in their ranges.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ from antennate.studies.pool import Workers, core_count, gather
 from antennate.studies.trials import OnStep, no_step
 from antennate_lab.fit import least_squares, recording
 from antennate_lab.fit.config import FitConfig
-from antennate_lab.fit.estimates import SHORTEST, Estimate, of_air
+from antennate_lab.fit.estimates import Estimate, of_air
 from antennate_lab.fit.parameters import BACKLASH, parameters
 from antennate_lab.fit.residuals import moving
 from antennate_lab.fit.simulated import Course
@@ -46,23 +47,26 @@ class Compared:
 
     Attributes:
         name: Which one, a key of `ALIKE`, in its unit.
-        low, high: Range in which it is as fitted.
+        ends: Range in which it is as fitted, None if the file has no interval.
         found: What the log says, None if it does not tell it.
     """
 
     name: str
-    low: float
-    high: float
+    ends: tuple[float, float] | None
     found: float | None
 
     @property
     def changed(self) -> bool:
         """Whether it is not as fitted."""
-        return self.found is not None and not self.low <= self.found <= self.high
+        if self.ends is None or self.found is None:
+            return False
+        return not self.ends[0] <= self.found <= self.ends[1]
 
     def expected(self) -> str:
         """The range, in words."""
-        return f"{self.name} {self.low:.2g} to {self.high:.2g}{_UNITS[self.name]}"
+        if self.ends is None:
+            return f"{self.name}: not in the file"
+        return f"{self.name} {self.ends[0]:.2g} to {self.ends[1]:.2g}{_UNITS[self.name]}"
 
     def said(self) -> str:
         """What was found, in words."""
@@ -76,7 +80,8 @@ class Row:
 
     Attributes:
         part: "log" or "joint".
-        grade: "ok"; "note", a number is not told; "warn", it is not as fitted.
+        grade: "ok"; "note", a number is not told or not in the file, or the joint was not swept;
+            "warn", it is not as fitted.
     """
 
     part: str
@@ -88,7 +93,7 @@ class Row:
 
 
 def rows(file: Path, log: Path, on_step: OnStep = no_step) -> list[Row]:
-    """A row for each joint that is swept alone, and one for the log.
+    """A row for the log, and one for each joint of the robot.
 
     Args:
         file: The fitted robot, as `antennate fit` writes it.
@@ -115,28 +120,34 @@ def rows(file: Path, log: Path, on_step: OnStep = no_step) -> list[Row]:
     tasks = [(robot, course) for course in alone]
     found = gather(_joint, tasks, Workers(min(core_count(), len(tasks))), on_step)
     names = [robot.joint_names[int(moving(course)[0])] for course in alone]
-    missed = [name for name in robot.joint_names if name not in names]
-    wrong = [*read.warnings, *([f"no sweep of {', '.join(missed)}"] if missed else [])]
-    grade, cure = ("warn", "record it again") if wrong else ("ok", "")
-    whole = Row("log", log.name, "all joints, whole", "; ".join(wrong) or "whole", grade, cure)
-    return [whole, *map(_row, names, found)]
+    swept = dict(zip(names, found, strict=True))
+    grade, cure = ("warn", "record it again") if read.warnings else ("ok", "")
+    wrong = "; ".join(read.warnings) or "whole"
+    whole = Row("log", log.name, "whole", wrong, grade, cure)
+    return [whole, *(_row(name, swept.get(name)) for name in robot.joint_names)]
 
 
-def _row(name: str, numbers: list[Compared]) -> Row:
-    changed = [each.name for each in numbers if each.changed]
-    unknown = [each.name for each in numbers if each.found is None]
-    cure = f"{' and '.join(changed)} not as fitted: look at {_causes(changed)}" if changed else ""
-    if unknown and not changed:
-        cure = (
-            f"the log does not tell {' and '.join(unknown)}: record it again, other programs ended"
-        )
+def _row(name: str, numbers: list[Compared] | None) -> Row:
+    """The row of a joint, None of one that was not swept."""
+    if numbers is None:
+        cure = f"not compared: `{typed('drive')} --protocol check` sweeps it"
+        return Row("joint", name, "a sweep of it alone in the air", "none", "note", cure)
+    held = [each for each in numbers if each.ends is not None]
+    changed = [each.name for each in held if each.changed]
+    unknown = [each.name for each in held if each.found is None]
+    absent = [each.name for each in numbers if each.ends is None]
+    cures = [f"{' and '.join(changed)} not as fitted: look at {_causes(changed)}"] * bool(changed)
+    if unknown:
+        cures.append(f"the log does not tell {' and '.join(unknown)}: record longer sweeps")
+    if absent:
+        cures.append(f"{' and '.join(absent)}: not in the file: fit a log that tells it")
     return Row(
         part="joint",
         check=name,
         expected=", ".join(each.expected() for each in numbers),
-        found=", ".join(each.said() for each in numbers),
-        grade="warn" if changed else "note" if unknown else "ok",
-        cure=cure,
+        found=", ".join(each.said() for each in held) or "not compared",
+        grade="warn" if changed else "note" if cures else "ok",
+        cure="; ".join(cures),
     )
 
 
@@ -152,32 +163,30 @@ def _joint(robot: RobotSpec, course: Course) -> list[Compared]:
     free: dict[str, tuple[str, int | None]] = {
         kind: (f"servos.{servo}.{path}", None) for kind, path in _OF_SERVO.items()
     }
+    absent = []
     if free["friction"][0] not in known:
         free.pop("friction")
+        absent = [Compared("friction", None, None)]
     if name in robot.yaw_names and course.gyro.size:
         free["backlash"] = (BACKLASH, robot.yaw_names.index(name))
     problem = least_squares.Problem(robot, [course], parameters(robot, free.values()), Workers(1))
+    if not any(each.name in known for each in problem.chosen):
+        return [Compared(kind, None, None) for kind in free] + absent
     solution = least_squares.solve(problem, problem.start, _ROUNDS)
     errors = least_squares.covariances(problem, solution, np.random.default_rng(0))
     found = zip(free, of_air(problem, solution, *errors), strict=True)
-    beside = [_compared(kind, each, known.get(each.parameter.name)) for kind, each in found]
-    return [each for each in beside if each is not None]
+    return [_compared(kind, each, known.get(each.parameter.name)) for kind, each in found] + absent
 
 
-def _compared(kind: str, each: Estimate, fitted: Fitted | None) -> Compared | None:
-    """An estimate beside the interval of the file; None where it has none.
-
-    A delay that no log told is the one of the file, within a timestep.
-    """
-    start = each.parameter.start
-    if fitted is None and kind == "lag":
-        fitted = Fitted(low=start, high=start + SHORTEST)
+def _compared(kind: str, each: Estimate, fitted: Fitted | None) -> Compared:
+    """An estimate beside the interval of the file."""
     if fitted is None:
-        return None
+        return Compared(kind, None, None)
     shown = [
-        start / x if kind == "gain" else _FACTORS[kind] * x
+        each.parameter.start / x if kind == "gain" else _FACTORS[kind] * x
         for x in (fitted.low, fitted.high, *each.interval, each.value)
     ]
     wider = ALIKE[kind] + abs(shown[3] - shown[2]) / 2
     low, high = sorted(shown[:2])
-    return Compared(kind, max(low - wider, 0.0), high + wider, shown[4] if each.told else None)
+    ends = (max(low - wider, 0.0), high + wider)
+    return Compared(kind, ends, shown[4] if each.told else None)

@@ -217,7 +217,7 @@ def _sentence(rows: Sequence[tuple[str, str]]) -> str:
         said.append(
             f"Of {len(joints)} joints {fitted} behave as fitted"
             f"{f', {changed} do not' if changed else ''}"
-            f"{f', {rest} the log does not tell' if rest else ''}."
+            f"{f', {rest} were not compared in full' if rest else ''}."
         )
     return " ".join(said)
 
