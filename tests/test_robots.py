@@ -119,7 +119,28 @@ def test_a_lifting_leg_rises_on_its_own_side_and_does_not_turn_without_end() -> 
         assert float(foot.xpos[2]) - before == pytest.approx(rise, abs=1e-9)
 
 
+GAIN = "servos.xc430_w240.gain_divisor"
+
+
+def interval(low: float, high: float, name: str = GAIN) -> str:
+    """A table [[fitted]]; the gain divisor of a new robot is 128 (data sheet)."""
+    return f'[[fitted]]\nname = "{name}"\nlow = {low}\nhigh = {high}\n'
+
+
 BAD = [
+    (interval(0.0, 130.0), f"fitted: {GAIN}: expected low above 0, found 0"),
+    (interval(-5.0, 130.0), f"fitted: {GAIN}: expected low above 0, found -5"),
+    (interval(130.0, 126.0), f"fitted: {GAIN}: expected low of at most high, found 130 and 126"),
+    (interval(100.0, 110.0), f"fitted: {GAIN}: expected its value within 100 to 110, found 128"),
+    (interval(126.0, 130.0) * 2, f"fitted: expected each name once, found {GAIN} more than once"),
+    (
+        interval(0.0, 1.0, "servos.ax12.friction"),
+        "fitted: expected names of numbers of this robot, found 'servos.ax12.friction'",
+    ),
+    (
+        interval(0.0, 0.1, "yaw.backlash[5]"),
+        "fitted: expected names of numbers of this robot, found 'yaw.backlash[5]'",
+    ),
     ("[legs]\nids = [6, 7, 8]", "legs.ids: expected one for each of the 12 joints, found 3"),
     ("[yaw]\nids = [1, 2, 3, 4, 4]", "ids: expected each once, found 4 more than once"),
     ("[yaw]\ndirections = [1, -1]", "yaw.directions: expected one for each of the 5 joints"),

@@ -135,6 +135,16 @@ def test_file_without_intervals_and_log_without_sweeps_are_refused(tmp_path: Pat
         compare.rows(fitted(tmp_path, LEGGED, **KNOWN), walk)
 
 
+@pytest.mark.parametrize("head", ["", "[robot]\n"])
+def test_interval_that_does_not_hold_its_value_is_refused(tmp_path: Path, head: str) -> None:
+    """Of a robot's file, and of the table of a robot.toml."""
+    table = "[[robot.fitted]]" if head else "[[fitted]]"
+    file = fitted(tmp_path, head + 'antennae = { kind = "none" }\n', **{GAIN: (100.0, 110.0)})
+    file.write_text(file.read_text().replace("[[fitted]]", table))
+    with pytest.raises(BadInputError, match="expected its value within 100 to 110, found 128"):
+        compare.rows(file, tmp_path / "none.mcap")
+
+
 def test_sentence_counts_joints_that_changed_and_those_that_nothing_tells() -> None:
     """Beside what it says of ports, where some were looked at."""
     port = {"part": "bus", "grade": "ok"}

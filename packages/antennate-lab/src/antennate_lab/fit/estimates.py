@@ -100,6 +100,7 @@ def of_air(
         if each.path.endswith("delay") and interval[0] <= SHORTEST:
             interval = (0.0, max(interval[1], SHORTEST))
         value = each.value(solution.x[p]) if told else each.start
+        interval = (min(interval[0], value), interval[1])  # a value that is nearly 0 is 0
         errors = draws[:, p] * sd[p] / max(draws[:, p].std(), 1e-12)
         found.append(Estimate(each, value, interval, told, "air", errors))
     return found

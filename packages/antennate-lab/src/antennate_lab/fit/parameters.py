@@ -123,7 +123,7 @@ def _list(robot: RobotSpec, path: str) -> tuple[float, ...]:
     """A list of the robot in full, also where its file leaves it empty."""
     if path == BACKLASH:
         return robot.backlash
-    return robot.legs.friction_factors or (1.0,) * robot.leg_count
+    return robot.factors
 
 
 def bounds(chosen: Sequence[Parameter]) -> tuple[Floats, Floats]:

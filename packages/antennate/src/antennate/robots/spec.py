@@ -8,6 +8,7 @@ angles and goals keep that order.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal, Self
 
@@ -17,6 +18,7 @@ from pydantic import (
     model_serializer,
     model_validator,
 )
+from pydantic.fields import FieldInfo
 
 from antennate import checks
 from antennate.errors import ConfigError
@@ -144,9 +146,23 @@ class RobotSpec(Params):
         own = str(text and checks.path("robot", text))
         path = own_file("--robot", own, ROBOTS, folder)
         robot = read_file(path, cls)
+        robot.require_held(path)
         if not robot.meshes:
             return robot
         return robot.model_copy(update={"meshes": str((path.parent / robot.meshes).absolute())})
+
+    def require_held(self, file: Path) -> None:
+        """Refuse a fitted number that its interval does not hold, as a file has it.
+
+        Raises:
+            ConfigError: There is one.
+        """
+        for each in self.fitted:
+            if not each.low <= (value := _number(self, each.name)[0]) <= each.high:
+                raise ConfigError(
+                    f"{file}: fitted: {each.name}: expected its value within {each.low:g} to "
+                    f"{each.high:g}, found {value:g}; set it back, or take this table away"
+                )
 
     @property
     def yaw_count(self) -> int:
@@ -203,8 +219,12 @@ class RobotSpec(Params):
     @property
     def leg_frictions(self) -> tuple[float, ...]:
         """Friction of each leg on the floor, as many as `leg_names`."""
-        factors = self.legs.friction_factors or (1.0,) * self.leg_count
-        return tuple(self.leg_friction * factor for factor in factors)
+        return tuple(self.leg_friction * factor for factor in self.factors)
+
+    @property
+    def factors(self) -> tuple[float, ...]:
+        """Friction of each leg over `leg_friction`, as many as `leg_names`."""
+        return self.legs.friction_factors or (1.0,) * self.leg_count
 
     @property
     def backlash(self) -> tuple[float, ...]:
@@ -463,6 +483,7 @@ class RobotSpec(Params):
                 f"found {self.imu.kind}"
             )
         _check_mass(self)
+        _check_fitted(self)
         if self.legs.reach is not None and self.hip < 0:
             raise ValueError(
                 f"legs.reach: expected at most {self.legs.reach + self.hip:g} m, half the width "
@@ -496,6 +517,50 @@ def require_antennae(robot: RobotSpec, what: str) -> None:
         raise ConfigError(
             f"expected a robot with antennae for {what}, found one without (antennae.kind)"
         )
+
+
+def _check_fitted(robot: RobotSpec) -> None:
+    """Refuse intervals of no number of the robot, doubled ones and those that can be none."""
+    names = [each.name for each in robot.fitted]
+    if doubled := sorted({name for name in names if names.count(name) > 1}):
+        raise ValueError(f"fitted: expected each name once, found {doubled[0]} more than once")
+    for each in robot.fitted:
+        least, open_end = _number(robot, each.name)[1:]
+        if each.low > each.high:
+            raise ValueError(
+                f"fitted: {each.name}: expected low of at most high, found {each.low:g} and "
+                f"{each.high:g}"
+            )
+        if each.low < least or (open_end and each.low == least):
+            words = "above" if open_end else "of at least"
+            raise ValueError(
+                f"fitted: {each.name}: expected low {words} {least:g}, found {each.low:g}"
+            )
+
+
+def _number(robot: RobotSpec, name: str) -> tuple[float, float, bool]:
+    """A number of a robot by its name in `fitted`, its least value, and if it must be above."""
+    path, _, place = name.removesuffix("]").partition("[")
+    lists = {"yaw.backlash": robot.backlash, "legs.friction_factors": robot.factors}
+    if path in lists and name == f"{path}[{place}]" and place.isdecimal():
+        if int(place) < len(lists[path]):
+            return lists[path][int(place)], 0.0, False
+    elif name == path:
+        *groups, last = path.split(".")
+        group: Any = robot
+        for each in groups:
+            group = getattr(group, each) if each in _fields(group) else None
+        field = _fields(group).get(last)
+        if field is not None and isinstance(value := getattr(group, last), float):
+            for bound in field.metadata:
+                if (least := getattr(bound, "gt", getattr(bound, "ge", None))) is not None:
+                    return value, least, hasattr(bound, "gt")
+            return value, -math.inf, False
+    raise ValueError(f"fitted: expected names of numbers of this robot, found {shown(name)}")
+
+
+def _fields(group: Any) -> Mapping[str, FieldInfo]:
+    return type(group).model_fields if isinstance(group, Params) else {}
 
 
 def _check_kind(robot: RobotSpec) -> None:
