@@ -264,6 +264,8 @@ robot --scene tunnel :: --scene: expected --export mjcf beside it, found none
 robot one two :: expected flags only, found 'two'
 doctor :: --esp32 PORT, --bus PORT or both
 doctor --compare fit.toml :: --compare: expected FILE and LOG, found no log :: drive --protocol check` records one
+doctor --compare fit.toml . :: .: expected a run with a log, found none :: drive --protocol check` records one
+fit . :: .: expected a run with a log, found none :: drive --protocol identify` records one
 doctor drive.mcap :: --log: expected --compare
 doctor --compare nowhere.toml drive.mcap :: nowhere.toml: :: No such file
 doctor --compare hexapod drive.mcap :: hexapod: expected intervals of servos, tables [[fitted]] :: found none

@@ -204,6 +204,9 @@ def test_command_refuses_the_log_of_another_robot(
     write(tmp_path / "short.toml", SMALL, sweeps(SMALL, "leg_l0"))
     line = refused("fit", "short.toml")
     assert "with links 6, found 2; give the file of the robot that was driven" in line
+    (tmp_path / "drive-1").mkdir()
+    (tmp_path / "short.toml").rename(tmp_path / "drive-1" / "drive.mcap")
+    assert "drive-1/drive.mcap: expected the robot of the file" in refused("fit", "drive-1")
 
 
 def test_what_is_wrong_with_a_log_stands_on_the_page() -> None:

@@ -23,11 +23,12 @@ class FitConfig(Params):
         json_schema_extra={
             "unit": "1",
             "source": "assumed: has to be named",
-            "metavar": "LOG",
+            "metavar": "RUN|LOG",
             "positional": True,
         },
     )
-    """Logs of `drive --protocol` of one robot, or recordings of one of its servos (JSON)."""
+    """Logs of `drive --protocol` of one robot, or the folders of these drives; or recordings of one
+    of its servos (JSON)."""
     robot: str = number(
         ROBOTS[0], "1", "assumed: the default robot", metavar="NAME|FILE", examples=list(ROBOTS)
     )
@@ -58,7 +59,9 @@ class FitConfig(Params):
         if "robot" not in table:
             return RobotSpec.named(self.robot)
         own = with_bases({"robot": table["robot"]}, _Holder, Path(self.robot).parent)
-        return from_values(_Holder, own).robot
+        robot = from_values(_Holder, own).robot
+        robot.require_held(Path(self.robot))
+        return robot
 
     @property
     def text(self) -> str:

@@ -10,8 +10,10 @@ from pathlib import Path
 import numpy as np
 
 from antennate.errors import BadInputError, SimulationError
+from antennate.messages import typed
 from antennate.robots.spec import RobotSpec
 from antennate.studies.pool import Workers, gather, workers_from
+from antennate.studies.run_files import log_of
 from antennate.studies.trials import OnStep, no_step
 from antennate.types import Floats
 from antennate_lab.fit import least_squares, measures, recording, regression
@@ -125,7 +127,8 @@ def run(config: FitConfig, workers: int | Workers, on_step: OnStep = no_step) ->
     if not config.log:
         raise BadInputError("log: expected logs of `drive --protocol`, found none")
     robot = config.described
-    recordings = [recording.read(Path(name), robot) for name in config.log]
+    cure = f"`{typed('drive')} --protocol identify` records one"
+    recordings = [recording.read(log_of(Path(name), cure), robot) for name in config.log]
     courses = [(each.name, course) for each in recordings for course in each.courses]
     held = _left_out(config, [course for _, course in courses])
     seen = [course for _, course in courses if course.name not in held]

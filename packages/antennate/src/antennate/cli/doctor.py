@@ -12,7 +12,7 @@ from typing import Any
 from pydantic.dataclasses import dataclass
 
 from antennate.cli.options import option
-from antennate.cli.results import ResultOptions, folder_for, log_of
+from antennate.cli.results import ResultOptions, folder_for
 from antennate.cli.robot import USUAL, PortOptions, at_hand, key_of, parse_robot, require_two_ports
 from antennate.cli.terminal import (
     BAD_INPUT,
@@ -33,6 +33,7 @@ from antennate.lookup import installed
 from antennate.messages import INSTALLATION, one_line, typed
 from antennate.studies.formats import to_json
 from antennate.studies.report import View
+from antennate.studies.run_files import log_of
 from antennate.studies.tables import Table
 
 DESCRIPTION = """\
@@ -48,6 +49,7 @@ joint whose lag, gain, friction or backlash is out of its range warns. No port i
 _STYLES = {"ok": "green", "note": "cyan", "warn": "yellow", "bad": "bold red"}
 _LOGGED = ("log", "joint")
 """Parts of the rows of --compare."""
+_RECORD = f"`{typed('drive')} --protocol check` records one"
 _ROUNDS = 4
 """Servos that change their id or speed are looked at anew before the rest is put right."""
 
@@ -74,10 +76,7 @@ def command(argv: Sequence[str]) -> int:
     """Examine, put right what was asked for, and tell."""
     config, options = parse_robot("doctor", DESCRIPTION, DoctorConfig, argv, DoctorOptions)
     if options.compare and not options.log:
-        raise ConfigError(
-            "--compare: expected FILE and LOG, found no log; "
-            f"`{typed('drive')} --protocol check` records one"
-        )
+        raise ConfigError(f"--compare: expected FILE and LOG, found no log; {_RECORD}")
     if not (options.esp32 or options.bus or options.compare):
         raise ConfigError(
             f"expected --esp32 PORT, --bus PORT or both, found none{at_hand(options)}"
@@ -92,7 +91,7 @@ def command(argv: Sequence[str]) -> int:
     with folder_for(VIEW, options, config, argv) if options.out else nullcontext() as folder:
         checkup, changes = _examine(robot, options, key)
         if options.compare and options.log:
-            checkup.rows += _compared(options.compare, log_of(options.log))
+            checkup.rows += _compared(options.compare, log_of(options.log, _RECORD))
         result = checkup.result(changes)
         if folder is not None:
             folder.finish(result)

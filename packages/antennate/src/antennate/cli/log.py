@@ -18,7 +18,7 @@ from antennate import experiments
 from antennate.cli.arguments import parse
 from antennate.cli.options import LiveOptions, option
 from antennate.cli.pages import MODULE, place_of
-from antennate.cli.results import ResultOptions, log_of, require_new, show_result
+from antennate.cli.results import ResultOptions, require_new, show_result
 from antennate.cli.terminal import BAD_INPUT, OK, progress, stop_signals
 from antennate.control.readings import condition
 from antennate.errors import FAILURES, ConfigError
@@ -29,7 +29,7 @@ from antennate.studies.formats import csv_lines
 from antennate.studies.parquet import require_parquet
 from antennate.studies.report import command_of
 from antennate.studies.run_directory import RunDirectory
-from antennate.studies.run_files import LOGS
+from antennate.studies.run_files import LOGS, log_of
 from antennate.studies.tables import Table
 from antennate.telemetry import PAGE_PORT, FilmView
 from antennate.telemetry.header import MOST_PARTS, RECOVERED, Header, part, parts

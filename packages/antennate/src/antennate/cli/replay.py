@@ -13,7 +13,7 @@ from antennate.cli.arguments import parse
 from antennate.cli.log import arena_of, complain
 from antennate.cli.options import ViewOptions, option
 from antennate.cli.pages import page_of, say_by_hand
-from antennate.cli.results import ResultOptions, folder_for, log_of, show_result
+from antennate.cli.results import ResultOptions, folder_for, show_result
 from antennate.cli.terminal import BAD_INPUT, OK
 from antennate.control.readings import OWN, YOKED, Readings, condition, short_names
 from antennate.errors import ConfigError
@@ -22,6 +22,7 @@ from antennate.studies.columns import Column, shown
 from antennate.studies.formats import csv_lines
 from antennate.studies.report import View
 from antennate.studies.run_directory import RunDirectory
+from antennate.studies.run_files import log_of
 from antennate.studies.tables import Table
 from antennate.telemetry.reader import LogReader
 from antennate.telemetry.replay import (

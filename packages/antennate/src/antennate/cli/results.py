@@ -27,16 +27,9 @@ from antennate.studies.formats import to_json
 from antennate.studies.page import spaced
 from antennate.studies.report import View, command_of, compare, report, write_report
 from antennate.studies.run_directory import RunDirectory
-from antennate.studies.run_files import (
-    LOG,
-    LOGS,
-    REPORT,
-    files_of,
-    listed,
-)
+from antennate.studies.run_files import REPORT, files_of, listed
 from antennate.studies.tables import Table
 from antennate.studies.trial_file import Tasks
-from antennate.telemetry.header import RECOVERED
 
 
 @dataclass(frozen=True)
@@ -97,26 +90,6 @@ def require_new(path: Path, overwrite: bool) -> None:
             f"{path}: expected no such file, found one; choose another with --out, or give "
             "--overwrite"
         )
-
-
-def log_of(path: Path) -> Path:
-    """The log that is meant by its name, or by the folder of a run that has one."""
-    if not path.is_dir():
-        return path
-    files = sorted((path / LOGS).glob("*.mcap"))
-    recovered = {file.with_stem(file.stem + RECOVERED) for file in files}
-    logs = [file for file in files if file not in recovered]
-    logs = logs or [file for file in [path / LOG] if file.exists()]
-    if not logs:
-        raise BadInputError(
-            f"{path}: expected a run with a log, found none; --log keeps those of a simulation"
-        )
-    if len(logs) > 1:
-        names = ", ".join(map(str, logs[:3]))
-        raise BadInputError(
-            f"{path}: expected a run with one log, found {len(logs)}; name one of {names}, …"
-        )
-    return logs[0]
 
 
 def show_result(

@@ -20,7 +20,7 @@ from antennate import checks
 from antennate.errors import BadInputError, ConfigError, OutputError
 from antennate.files import decoded, open_regular, read_limited, remove_abandoned, write_whole
 from antennate.studies.trial_file import TRIALS, locked
-from antennate.telemetry.header import MOST_PARTS, part
+from antennate.telemetry.header import MOST_PARTS, RECOVERED, part
 
 T = TypeVar("T")
 _DATE = "%Y-%m-%d %H:%M:%S UTC"
@@ -55,6 +55,32 @@ NAMES = (
 """Every file that a run may write beside its figures."""
 BEFORE = ("trials.store.jsonl", "trials.partial.jsonl")
 """Files of the trials of versions before, which are not gone on with."""
+
+
+def log_of(path: Path, cure: str = "--log keeps those of a simulation") -> Path:
+    """The log that is meant by its name, or by the folder of a run that has one.
+
+    Args:
+        path: A log, or a folder.
+        cure: What makes a log, for the message.
+
+    Raises:
+        BadInputError: The folder has none, or several.
+    """
+    if not path.is_dir():
+        return path
+    files = sorted((path / LOGS).glob("*.mcap"))
+    recovered = {file.with_stem(file.stem + RECOVERED) for file in files}
+    logs = [file for file in files if file not in recovered]
+    logs = logs or [file for file in [path / LOG] if file.exists()]
+    if not logs:
+        raise BadInputError(f"{path}: expected a run with a log, found none; {cure}")
+    if len(logs) > 1:
+        names = ", ".join(map(str, logs[:3]))
+        raise BadInputError(
+            f"{path}: expected a run with one log, found {len(logs)}; name one of {names}, …"
+        )
+    return logs[0]
 
 
 def listed(place: Path) -> list[str] | None:
