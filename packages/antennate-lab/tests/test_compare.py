@@ -86,6 +86,9 @@ def test_joint_that_nobody_touched_is_as_fitted(tmp_path: Path) -> None:
         ({"gain_divisor": 256.0}, "gain", 0.5, 0.02),
         ({"delay": 0.02}, "lag", 20.0, 2.0),
         ({"friction": 0.06}, "friction", 0.06, 0.01),
+        ({"gain_divisor": 128.0 / 0.75}, "gain", 0.75, 0.02),  # three times the margin hides these
+        ({"delay": 0.012}, "lag", 12.0, 2.0),
+        ({"friction": 0.045}, "friction", 0.045, 0.01),
     ],
 )
 def test_joint_that_was_changed_is_named(
@@ -100,7 +103,7 @@ def test_joint_that_was_changed_is_named(
 @pytest.mark.parametrize(
     ("known", "absent"),
     [
-        ({"servos.xl330_m288.gain_divisor": (120.0, 136.0)}, ["lag", "gain", "friction"]),
+        ({"servos.xl330_m288.gain_divisor": (250.0, 262.0)}, ["lag", "gain", "friction"]),
         ({GAIN: (126.0, 130.0), FRICTION: (0.0, 0.002)}, ["lag"]),
         ({DELAY: (0.0, 0.002)}, ["gain", "friction"]),
     ],
