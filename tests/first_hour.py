@@ -134,7 +134,7 @@ def connect_each(command: Command, order: Callable[[str], object], names: Sequen
 
 def move_each(command: Command, order: Callable[[str], object], names: Sequence[str]) -> None:
     """Hold the robot straight, then move each joint as asked."""
-    command.until("hold the robot straight")
+    command.until("hold (the robot straight|the antenna at its mounting angle)")
     order("push all=0deg")
     time.sleep(0.8)
     command.type()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import time
 import tomllib
 from pathlib import Path
@@ -33,7 +34,7 @@ def act(command: Command, script: Script) -> None:
     assert script.twin is not None
     order = script.twin.order
     if command.words[0] == "record":
-        for _ in range(4 * 5):
+        for _ in range(6 * 5):
             mark = command.until(r"hold at (\d+) mm")[1]
             order(f"touch left:{mark}mm")
             time.sleep(0.3)  # the bend has to arrive before it is confirmed
@@ -62,6 +63,11 @@ def test_a_new_servo_becomes_a_calibrated_antenna_by_the_commands_of_the_page(
     assert abs(made["antennae"]["zeros"][0] - 2090) <= 1
     assert made["antennae"]["ids"] == [1]
     assert "left antenna" in script.said
+    assert "hold the antenna at its mounting angle; then Enter" in script.said
+    assert "The bench may be moved" in script.said
+    assert not any(word in script.said for word in ("lithium", "robot may", "mid-stance"))
+    assert "it takes 3 or more" not in script.said  # pushes for an interval
+    assert re.search(r"left +[\d.]+ ± +[\d.]+ +[\d.]+ Hz", script.said)  # no right antenna
     assert not any(f"right {what}" in script.said for what in ("antenna", "noise", "calibration"))
     curve = json.loads((tmp_path / "left" / "calibration.json").read_text())
     assert curve["polarity"] == -1  # resistance rises with the bend, the fixed one leads to ground

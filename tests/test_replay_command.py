@@ -315,6 +315,36 @@ def test_the_figure_shows_every_stretch_and_repeats_its_bytes() -> None:
     assert [panel.get_title(loc="left") for panel in of_twin.axes] == ["Readings"]
 
 
+def test_a_pause_without_a_log_is_left_empty() -> None:
+    """Two seconds of ticks, a pause of 28 s after a fault, two seconds of ticks."""
+    t = np.concatenate([np.arange(200), np.arange(3000, 3200)]) * 0.01
+    course = Course(
+        t=t,
+        reading=np.full((400, 2), 1800.0),
+        level=np.zeros((400, 2)),
+        contact=np.repeat([Contact.CONTACT, Contact.UNKNOWN, Contact.CONTACT], [150, 50, 200])[
+            :, None
+        ].repeat(2, axis=1),
+        recorded=np.repeat([Maneuver.FORWARD, Maneuver.HOLD, Maneuver.HOLD], [150, 50, 200]),
+        replayed=None,
+        state=["OK"] * 150 + ["FAULT"] * 50 + ["OK"] * 200,
+        threshold=0.4,
+    )
+    readings, levels, *bands = draw(course).axes
+    for line in (*readings.lines, *levels.lines[:2]):
+        x, y = (np.asarray(values, float) for values in line.get_data())
+        assert x[np.isnan(y)] == pytest.approx([2.0])  # where the line breaks
+        assert np.isfinite(y).sum() == 400
+    spans = [
+        path.get_extents().intervalx.tolist()
+        for panel in bands
+        for bars in panel.collections
+        for path in bars.get_paths()
+    ]
+    assert len(spans) == 2 * 3 + 3 + 3  # both sides; maneuvers, HOLD in two pieces; states
+    assert not any(begin < 29.9 and end > 2.1 for begin, end in spans)
+
+
 @pytest.mark.parametrize("fresh", [True, False])
 def test_G7_a_tick_without_a_decision_keeps_the_last_pose_that_was_not_refused(
     log: Path, fresh: bool

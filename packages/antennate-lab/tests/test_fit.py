@@ -160,6 +160,19 @@ def test_backlash_drives_what_a_simulation_feels() -> None:
     assert abs(slack - tight)[:, 2].max() > 0.02
 
 
+def test_a_fit_tells_how_far_it_is_before_the_air_is_done(tmp_path: Path) -> None:
+    """A line stands for each tenth: one when the search has its start, one for its first round."""
+    path = write(tmp_path / "drive.mcap", SMALL, sweeps(SMALL, "leg_l0", seconds=0.5))
+    file = tmp_path / "known.toml"
+    file.write_text('links = 2\nmass = 0.8\nantennae = { kind = "none" }\n')
+    told: list[float] = []
+    config = FitConfig(log=(str(path),), robot=str(file))
+    run(config, 1, lambda done, of: told.append(done / of))
+    assert told == sorted(told)
+    assert told[-1] == 1.0
+    assert {0.1, 0.2} <= set(told)
+
+
 def test_log_of_another_robot_is_refused(tmp_path: Path) -> None:
     """Links and servo models of a log and of the robot's file have to agree."""
     path = write(tmp_path / "drive.mcap", SMALL, sweeps(SMALL, "leg_l0"))

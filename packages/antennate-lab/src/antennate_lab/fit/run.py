@@ -33,8 +33,10 @@ _DELAY = 0.005
 """Delay with which a search begins [s]."""
 _LEVEL = 0.4
 """Standard deviation of the logarithm of the friction that all legs share, before."""
-_AIR, _ALL = 400, 1000
-"""Steps of the progress line when the air is done, and at the end."""
+_START, _AIR, _ALL = 100, 400, 1000
+"""Steps of the progress line when a search has its start, when the air is done, and at the end."""
+_HALF = 2
+"""Rounds of a search in the air that count as half of it: the first rounds take longest."""
 
 
 @dataclass(frozen=True)
@@ -186,10 +188,10 @@ def _in_air(
     """Servos, backlash and antennae from steps in the air."""
     chosen = parameters(robot, _names(robot))
 
-    def told(done: int, of: int) -> None:
-        on_step(_AIR // 5 + round(0.8 * _AIR * done / of), _ALL)
+    def told(done: int, _most: int) -> None:
+        on_step(_START + (_AIR - _START) * done // (done + _HALF), _ALL)
 
-    begin = _start(robot, chosen, air, pool)
+    begin = _start(robot, chosen, air, pool, on_step)
     problem = Problem(robot, air, chosen, pool, told)
     solution = least_squares.solve(problem, begin)
     covariance, draws = least_squares.covariances(problem, solution, rng)
@@ -221,7 +223,11 @@ def _names(robot: RobotSpec) -> list[tuple[str, int | None]]:
 
 
 def _start(
-    robot: RobotSpec, chosen: Sequence[Parameter], air: list[Course], pool: Workers
+    robot: RobotSpec,
+    chosen: Sequence[Parameter],
+    air: list[Course],
+    pool: Workers,
+    on_step: OnStep,
 ) -> Floats:
     """Place at which the search begins: the best of several, by the lightest joints alone.
 
@@ -239,6 +245,7 @@ def _start(
             if each.path.endswith("delay"):
                 begin[place] = max(begin[place], _DELAY)
         found.append(least_squares.solve(problem, begin, rough=True))
+        on_step(_START * len(found) // len(_GAINS), _ALL)
     best = min(found, key=lambda each: each.misfit)
     known = dict(zip([each.name for each in few], best.x.tolist(), strict=True))
     return np.array([known.get(each.name, each.searched(each.start)) for each in chosen])

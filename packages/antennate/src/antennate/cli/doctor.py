@@ -98,7 +98,7 @@ def command(argv: Sequence[str]) -> int:
         if options.json:
             write_result(to_json(result))
         else:
-            _show(checkup.rows)
+            _show(checkup.rows, checkup.walks)
     return BAD_INPUT if checkup.grade == "bad" else OK
 
 
@@ -179,7 +179,7 @@ def _agreed(change: Change, yes: bool) -> bool:
     return sys.stdin.readline().strip().lower() in ("y", "yes")
 
 
-def _show(rows: Sequence[Row]) -> None:
+def _show(rows: Sequence[Row], walks: bool) -> None:
     """Print one line for each row, then the cures."""
     from rich.box import SIMPLE_HEAD  # slow to import
     from rich.table import Table
@@ -201,15 +201,15 @@ def _show(rows: Sequence[Row]) -> None:
             one_line(row.cure),
         )
         output.print(line, soft_wrap=True)
-    sentence = Text(_sentence([(row.part, row.grade) for row in rows]))
+    sentence = Text(_sentence([(row.part, row.grade) for row in rows], walks))
     output.print(sentence, soft_wrap=not output.is_terminal)
 
 
-def _sentence(rows: Sequence[tuple[str, str]]) -> str:
+def _sentence(rows: Sequence[tuple[str, str]], walks: bool) -> str:
     """What came out of checks, by part and grade, in a sentence on ports and one on joints."""
     grades = [grade for part, grade in rows if part not in _LOGGED]
     joints = [grade for part, grade in rows if part == "joint"]
-    said = [_driven(grades)] if grades else []
+    said = [_driven(grades, walks)] if grades else []
     if joints:
         fitted, changed = joints.count("ok"), joints.count("warn")
         rest = len(joints) - fitted - changed
@@ -221,17 +221,18 @@ def _sentence(rows: Sequence[tuple[str, str]]) -> str:
     return " ".join(said)
 
 
-def _driven(grades: Sequence[str]) -> str:
-    """Whether the robot may be driven."""
+def _driven(grades: Sequence[str], walks: bool) -> str:
+    """Whether the robot may be driven, or the servos of a bench moved."""
+    what, done = ("robot", "driven") if walks else ("bench", "moved")
     checks, bad, warnings, notes = len(grades), *map(grades.count, ("bad", "warn", "note"))
     assumed = f"; numbers assumed: {notes}" if notes else ""
     if bad:
         return (
-            f"The robot must not be driven yet: {bad} of {checks} checks are bad, {warnings} warn."
+            f"The {what} must not be {done} yet: {bad} of {checks} checks are bad, {warnings} warn."
         )
     if warnings:
-        return f"The robot may be driven: no check is bad, {warnings} of {checks} warn{assumed}."
-    return f"The robot may be driven: all {checks} checks are good{assumed}."
+        return f"The {what} may be {done}: no check is bad, {warnings} of {checks} warn{assumed}."
+    return f"The {what} may be {done}: all {checks} checks are good{assumed}."
 
 
 def _tables(result: Mapping[str, Any]) -> Sequence[Table]:
@@ -242,7 +243,8 @@ def _tables(result: Mapping[str, Any]) -> Sequence[Table]:
 
 
 def _sentence_of(result: Mapping[str, Any]) -> str:
-    return _sentence([(row["part"], row["grade"]) for row in result["rows"]])
+    rows = [(row["part"], row["grade"]) for row in result["rows"]]
+    return _sentence(rows, result.get("walks", True))
 
 
 VIEW = View("doctor", DESCRIPTION, DoctorConfig, _tables, _sentence_of)

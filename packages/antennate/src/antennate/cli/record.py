@@ -36,6 +36,7 @@ it at a constant speed from Enter on; with neither, readings of both antennae ar
 duration is over or Ctrl-C.
 
 Every line is flushed; a file that exists is left alone."""
+_SIDES = ("left", "right")
 _SHOWN = 100
 """Readings over which mean and noise are shown."""
 
@@ -49,8 +50,15 @@ class RecordOptions(RobotOptions):
 
 def command(argv: Sequence[str]) -> int:
     """Record until all marks or pushes are done, or the time is over."""
+    sides = _SIDES
+
+    def take(robot: RobotFile) -> RecordConfig:
+        nonlocal sides
+        sides = _SIDES[: robot.robot.antenna_count or len(_SIDES)]
+        return robot.for_record()
+
     params, options = parse_robot(
-        "record", DESCRIPTION, RecordConfig, argv, RecordOptions, take=RobotFile.for_record
+        "record", DESCRIPTION, RecordConfig, argv, RecordOptions, take=take
     )
     if not options.esp32:
         raise ConfigError(f"--esp32: expected a serial port, found none{at_hand(options)}")
@@ -60,7 +68,7 @@ def command(argv: Sequence[str]) -> int:
     opener = opener_of(options.esp32, "--esp32", key, params.network)
     with opener(BOARD_BAUD) as port:
         board = Board(port)
-        status = Status(board, params, now)
+        status = Status(board, params, now, sides)
         with Lines(options.out) as lines, stop_signals():
             recorder = Recorder(board, params, now, status.ask, lines.write, status)
             then = "."
@@ -102,13 +110,19 @@ class Lines:
 class Status:
     """One line on stderr now and then: readings, their noise, rate and losses."""
 
-    def __init__(self, board: Board, params: RecordParams, now: Callable[[], float]) -> None:
-        self._waiting = False
+    def __init__(
+        self,
+        board: Board,
+        params: RecordParams,
+        now: Callable[[], float],
+        sides: Sequence[str] = _SIDES,
+    ) -> None:
+        self._waiting, self._sides = False, sides
         self._board, self._params, self._now = board, params, now
         self._shown: deque[Timed] = deque(maxlen=_SHOWN)
         both = params.speed is None and not params.marks
         self._codes: dict[str, array[int]] = {
-            side: array("H") for side in ("left", "right") if both or side == params.side
+            side: array("H") for side in sides if both or side == params.side
         }
         self._status = StatusLine()
 
@@ -149,7 +163,7 @@ class Status:
         span = self._shown[-1].arrived - self._shown[0].arrived
         rate = (len(self._shown) - 1) / span if span > 0 else 0.0
         parts = ["waiting for Enter" if self._waiting else "recording"]
-        for side in ("left", "right"):
+        for side in self._sides:
             counts = [float(getattr(reading.sample, side)) for reading in self._shown]
             parts.append(f"{side} {fmean(counts):6.1f} ± {pstdev(counts):4.1f}")
         bytes_ = self._board.decoder.counters

@@ -47,8 +47,9 @@ later. Two servos on the bus and a servo of another model are refused. For one t
 asked whether it is a spare, to become the servo of this joint."""
 ZERO_DESCRIPTION = """\
 Measure zeros and directions of all joints. Torque goes off; you hold the robot straight, legs at
-mid-stance, antennae at their mounting angle, and press Enter. Then you move each joint in turn as
-you are told, and the sign of its motion becomes its direction. Live numbers show what is read.
+mid-stance, antennae at their mounting angle (of a bench these alone), and press Enter. Then you
+move each joint in turn as you are told, and the sign of its motion becomes its direction. Live
+numbers show what is read.
 
 A horn that sits a tooth off is told. robot.toml (--config names another file) gets zeros and
 directions at the end; all else in it stays. Nothing moves by itself."""

@@ -78,6 +78,11 @@ class Supply:
     fuse: float
     least_capacity: float
 
+    @property
+    def on_cells(self) -> bool:
+        """Whether a battery of three lithium cells feeds it, not a power supply."""
+        return self.rails[0].voltage > CELLS_FROM
+
     def hours(self, capacity: float) -> float:
         """How long a battery [Ah] lasts while walking, down to a fifth of its charge [h]."""
         return 0.8 * capacity / self.walking
@@ -211,7 +216,7 @@ def _power(power: Supply) -> list[Part]:
             "all servos",
             f"{amperes}, {power.least_capacity:.1f} Ah or more",
         )
-        if main.voltage > CELLS_FROM
+        if power.on_cells
         else Part(1, "power supply", "all servos", amperes),
         Part(1, "fuse and holder", "at the plus pole of the supply", f"{power.fuse:g} A"),
         Part(

@@ -10,7 +10,7 @@ from matplotlib.patches import FancyBboxPatch
 
 from antennate import figures as style
 from antennate.robots.antenna import BASE
-from antennate.robots.parts import CELLS_FROM, Supply, supply
+from antennate.robots.parts import Supply, supply
 from antennate.robots.servos import ServoParams
 from antennate.robots.spec import ANTENNA_PREFIXES, RobotSpec
 from antennate.types import SIDES
@@ -188,7 +188,7 @@ def _electronics(axes: Axes, power: Supply, robot: RobotSpec, converter: float) 
     battery = f"battery {main:g} V\n{power.least_capacity:.1f} Ah or more\ncan feed a stall"
     for step, text in enumerate(
         (
-            battery if main > CELLS_FROM else f"supply {main:g} V\n{power.stall:.1f} A or more",
+            battery if power.on_cells else f"supply {main:g} V\n{power.stall:.1f} A or more",
             f"fuse {power.fuse:g} A",
             f"emergency stop\n{power.stall:.2g} A",
         )

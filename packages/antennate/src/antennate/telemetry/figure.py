@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import groupby, islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -23,8 +23,12 @@ if TYPE_CHECKING:
 
 _MOST_DRAWN = 5000
 """Most ticks that a figure shows."""
+_PAUSE = 1.0
+"""Time without a tick that a figure leaves empty [s] (assumed: a hundred ticks)."""
 _LARGEST = 1e100
 """Largest number that it shows; an axis of larger ones overflows."""
+_NOTHING = -9
+"""A code that has no colour."""
 _SIDES = ("left", "right")
 _STATES = {
     "OK": "#BFE3B4",
@@ -102,6 +106,26 @@ class Course:
         )
 
 
+def _with_pauses(course: Course) -> Course:
+    """The course with a tick of which nothing is known at the begin of each pause."""
+    step = np.diff(course.t)
+    usual = float(np.median(step)) if step.size else 0.0
+    after = np.flatnonzero(step > max(_PAUSE, 3.0 * usual)) + 1
+
+    def cut(values: Any, nothing: float | str) -> Any:
+        return np.insert(np.asarray(values), after, nothing, axis=0)
+
+    begins = {"t": np.insert(course.t, after, course.t[after - 1] + usual)}
+    numbers = ("reading", "level", "pitch", "elevation")
+    known = [name for name in numbers if len(getattr(course, name))]
+    empty = {name: cut(getattr(course, name), math.nan) for name in known}
+    codes = ("contact", "recorded", "replayed")
+    decided = [name for name in codes if getattr(course, name) is not None]
+    none = {name: cut(getattr(course, name), _NOTHING) for name in decided}
+    states = cut(np.array(course.state, object), "").tolist()
+    return replace(course, **begins, **empty, **none, state=states)
+
+
 def of_arrays(
     t: Floats, reading: Floats, level: Floats, contact: Ints, maneuver: Ints, threshold: float
 ) -> Figure:
@@ -152,8 +176,9 @@ def replay(course: Course) -> Figure:
     heights = [height for height, _ in parts]
     figure = style.canvas(style.WIDTH, 1.0 + 0.75 * sum(heights))
     panels = figure.subplots(len(parts), 1, sharex=True, height_ratios=heights, squeeze=False)
+    shown = _with_pauses(course)
     for panel, (_, draw) in zip(panels[:, 0], parts, strict=True):
-        draw(panel, course)
+        draw(panel, shown)
     panels[-1, 0].set(xlabel="time of the loop [s]")
     return figure
 

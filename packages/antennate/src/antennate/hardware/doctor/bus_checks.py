@@ -12,6 +12,7 @@ from antennate.hardware.doctor.check import Finding, Grade, grouped, ids_text, w
 from antennate.hardware.dynamixel.bringup import CURE
 from antennate.hardware.dynamixel.tick_time import ADAPTER, tick_time
 from antennate.hardware.joints import settings
+from antennate.robots.parts import supply
 from antennate.robots.spec import RobotSpec
 from dynamixel_bus.inquiry import FOUND, State
 from dynamixel_bus.model import RETURN_DELAY_UNIT, WATCHDOG_UNIT, hardware_errors
@@ -34,8 +35,8 @@ Grading = Callable[[BusSurvey, DoctorConfig, int, int], Grade]
 class _Check(NamedTuple):
     """A check of one register of all servos, by default one that `drive` requires.
 
-    In `expected` {config} and {modes} are filled in, in `cure` the {ids} that are not ok; `text`
-    says a value in words. `name` is that of the register if empty.
+    In `expected` {config}, {modes} and {body} are filled in, in `cure` the {ids} that are not ok;
+    `text` says a value in words. `name` is that of the register if empty.
     """
 
     register: str
@@ -49,6 +50,8 @@ class _Check(NamedTuple):
 def register_findings(bus: BusSurvey, config: DoctorConfig) -> Iterator[tuple[Finding, str, str]]:
     """Each with the name of its check and what would be good; of the servos that are expected."""
     modes = grouped(config.robot.modes)
+    warn = config.limits.supply_warn
+    body = f"body from {warn:g} V on, antennae " if supply(config.robot).on_cells else ""
     yield _position_limits(bus, config)
     for check in _CHECKS:
         values = _values(bus, config, check.register)
@@ -56,7 +59,7 @@ def register_findings(bus: BusSurvey, config: DoctorConfig) -> Iterator[tuple[Fi
         grades: dict[int, Grade] = {i: grading(bus, config, i, values[i]) for i in values}
         finding = _of_servos(grades, grouped(values, check.text), check.cure)
         name = check.name or check.register.replace("_", " ")
-        yield finding, name, check.expected.format(config=config, modes=modes)
+        yield finding, name, check.expected.format(config=config, modes=modes, body=body)
 
 
 def _values(bus: BusSurvey, config: DoctorConfig, register: str) -> dict[int, int]:
@@ -161,7 +164,7 @@ _CHECKS = (
     ),
     _Check(
         "present_input_voltage",
-        "body from {config.limits.supply_warn:g} V on, antennae within their limits",
+        "{body}within their limits",
         "{ids}: charge the battery, or check supply and cable to them",
         lambda value: f"{_VOLT * value:.1f} V",
         _supply,

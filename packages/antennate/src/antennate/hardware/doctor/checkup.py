@@ -18,11 +18,16 @@ from dynamixel_bus.port import PortError
 
 @dataclass(slots=True)
 class Checkup:
-    """A row for each check, and the surveys of the ports that were looked at."""
+    """A row for each check, and the surveys of the ports that were looked at.
+
+    Attributes:
+        walks: Whether it is of a robot with legs, not of a bench.
+    """
 
     rows: list[Row] = field(default_factory=list[Row])
     bus: BusSurvey | None = None
     board: BoardSurvey | None = None
+    walks: bool = True
 
     @property
     def grade(self) -> Grade:
@@ -35,6 +40,7 @@ class Checkup:
             "schema": 1,
             "command": "doctor",
             "grade": self.grade,
+            "walks": self.walks,
             "rows": [asdict(row) for row in self.rows],
             "bus": None if self.bus is None else self.bus.result(),
             "esp32": None if self.board is None else self.board.result(),
@@ -56,7 +62,7 @@ def examine(
         esp32: The same of the antenna board.
         now: Monotonic time [s].
     """
-    checkup = Checkup()
+    checkup = Checkup(walks=config.robot.leg_count > 0)
 
     def bus_rows(path: str, opener: Opener) -> Iterator[Row]:
         survey = checkup.bus = survey_bus(opener, config.robot, config.doctor, now)

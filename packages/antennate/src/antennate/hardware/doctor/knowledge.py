@@ -11,6 +11,7 @@ from antennate.hardware.doctor.check import Finding, Grade, Row, ids_text
 from antennate.hardware.joints import unmeasured
 from antennate.messages import typed
 from antennate.params.control import CurveParams
+from antennate.robots.parts import supply
 
 
 def rows(config: DoctorConfig, bus: bool, esp32: bool) -> Iterator[Row]:
@@ -22,7 +23,8 @@ def rows(config: DoctorConfig, bus: bool, esp32: bool) -> Iterator[Row]:
         for name, group, count in robot.groups
         if count and math.isfinite(group.largest) and _unstated(group, "limit")
     )
-    supply = _unstated(config.limits, "supply_warn", "supply_hold", "supply_off")
+    cells = bus and supply(robot).on_cells
+    volts = _unstated(config.limits, "supply_warn", "supply_hold", "supply_off")
     left, right = _curve(control.conditioning), control.conditioning_right
     other = _curve(right) if right else left or "that of the left one"
     axes = ", ".join(["x", "y", *_unstated(robot.imu, "gyro_step", "accel_step")])
@@ -32,7 +34,7 @@ def rows(config: DoctorConfig, bus: bool, esp32: bool) -> Iterator[Row]:
         (bus, "ids", ids and f"{ids_text(ids)} in the order of the joints", "warn",
          f"`{typed('setup')}` and `{typed('zero')}` write them"),
         (bus, "joint limits", ", ".join(limits), "note", "set robot.*.limit to where they stop"),
-        (bus, "supply limits", supply and f"{', '.join(supply)} V, of three lithium cells", "note",
+        (cells, "supply limits", volts and f"{', '.join(volts)} V, of three lithium cells", "note",
          "set limits.supply_warn, supply_hold and supply_off to what your supply needs"),
         (sided, "left calibration", left, "warn", f"{curve} = FILE"),
         (both, "right calibration", other, "warn" if right or left else "note",

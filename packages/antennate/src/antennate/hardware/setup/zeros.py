@@ -26,10 +26,8 @@ from dynamixel_bus.bus import Bus
 from dynamixel_bus.model import POSITION_UNIT, TICKS_A_TURN
 from dynamixel_bus.models import XC430_W240
 
-POSE = (
-    "hold the robot straight: links in one line, every leg at mid-stance (ring lowest), both "
-    "antennae at their mounting angle"
-)
+_ANTENNAE = ("", "the antenna at its mounting angle", "both antennae at their mounting angle")
+"""Pose of so many antennae."""
 _PERIOD = 0.05
 """Time between two readings [s]."""
 _LOST = 20
@@ -70,6 +68,15 @@ class HornNote(NamedTuple):
             "horn on anew with its mark at the mark of the shaft, or keep it and lose that much of "
             "its way"
         )
+
+
+def _pose(robot: RobotSpec) -> str:
+    """How a robot, or a bench, is held while its zeros are measured."""
+    antennae = _ANTENNAE[robot.antenna_count]
+    if not robot.leg_count:
+        return f"hold {antennae}"
+    straight = "links in one line, every leg at mid-stance (ring lowest)"
+    return f"hold the robot straight: {straight}{antennae and f', {antennae}'}"
 
 
 class Positions:
@@ -127,7 +134,7 @@ class Zeroing:
     def zeros(self, person: Person) -> list[int]:
         """The zero of each joint [ticks], once the robot is held straight and still."""
         while True:
-            person.say(f"{POSE}; then Enter [q ends]")
+            person.say(f"{_pose(self._robot)}; then Enter [q ends]")
             self._wait_for_enter(person)
             try:
                 return self._mean()
