@@ -24,6 +24,7 @@ from antennate.sim.world import World, compile_world
 from antennate.testing import check_robot
 from antennate_build import antenna_checks, checks, fasteners, kernel, mounts, voxels, weights
 from antennate_build.antenna_assembly import AntennaSolids
+from antennate_build.build import comparing
 from antennate_build.layout import layout_of
 from antennate_build.mounts import X330
 from antennate_build.printing import PrintParams
@@ -90,6 +91,10 @@ def test_an_antenna_of_stainless_wire_weighs_within_a_tenth_of_the_simulated_one
     mass = result["masses"]["antenna's mass"]
     assert mass["specified"] == pytest.approx(5.8)  # six links of 0.8 g, a base of 1 g
     assert abs(mass["difference"]) < 0.1
+    by_name = {check["name"]: check for check in result["checks"]}
+    weighed = by_name.pop("mass of the antenna, of the specification")
+    assert weighed["warn"] == (result["masses"]["bracket's mass"]["difference"] > 0.1)
+    assert not any(check["warn"] for check in by_name.values())
     for name, part in result["parts"].items():
         mesh = trimesh.load(out / "stl" / f"{name}.stl")
         assert mesh.is_watertight, name
@@ -212,3 +217,15 @@ def test_the_volume_of_cubes_is_that_of_the_solid() -> None:
     assert cubes.inside.sum() * 1e-3 == pytest.approx(expected, rel=0.01)
     assert kernel.volume(ball) == pytest.approx(expected, rel=1e-6)
     assert np.isfinite(mesh_of(ball).points).all()
+
+
+@pytest.mark.parametrize(("built", "warned"), [(1.09, False), (1.11, True), (0.89, True)])
+def test_a_mass_more_than_a_tenth_off_is_told(built: float, warned: bool) -> None:
+    masses = {
+        "antenna's mass": comparing.compared("g", 5.8, 5.8),
+        "bracket's mass": comparing.compared("g", 1.0, built),
+        "antenna's inertia about its base": comparing.compared("g·mm²", 1.0, 2.0),
+    }
+    check = comparing.mass_check(masses)
+    assert (check.good, check.warn) == (True, warned)
+    assert f"bracket's mass {100 * built - 100:+.1f} %" in check.found

@@ -140,6 +140,7 @@ def test_the_hexapod_is_refused_in_one_line_as_its_legs_lift(
     assert main(["build", "hexapod", "--out", str(tmp_path / "out")]) == 2
     error = capsys.readouterr().err
     assert "robot.legs.kind: expected rolling legs, whose links are known, found lifting" in error
+    assert "`antennate build ROBOT --what antenna` builds its antenna alone" in error
     assert error.count("\n") == 1
 
 
@@ -155,7 +156,7 @@ def test_without_the_kernel_one_line_says_what_to_install(
     assert "./antennate/packages/antennate-build[build]" in error
 
 
-def test_a_file_of_an_antenna_builds_the_antenna_alone(tmp_path: Path) -> None:
+def test_a_file_of_an_antenna_or_its_name_builds_the_antenna_alone(tmp_path: Path) -> None:
     from antennate_build.build.config import read
 
     file = tmp_path / "antenna.toml"
@@ -163,4 +164,6 @@ def test_a_file_of_an_antenna_builds_the_antenna_alone(tmp_path: Path) -> None:
     config = read(file)
     assert config.what == "antenna"
     assert config.robot.antenna.active_coils == (3.0, 6.0)
+    named = read(Path("antenna"))
+    assert (named.what, named.robot) == ("antenna", RobotSpec())
     assert read(Path("scuttle3d")).robot == RobotSpec.named("scuttle3d")

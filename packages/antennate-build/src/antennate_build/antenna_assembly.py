@@ -79,21 +79,12 @@ class AntennaSolids:
             counts[name] = counts.get(name, 0) + 1
         return counts | {"pin": self.hinges, "cover": self.layout.sensed + 1}
 
-    @cached_property
-    def springs(self) -> tuple[Solid, ...]:
-        """Springs, base to tip, each about its hinge."""
-        made: dict[float, Solid] = {}
-        for n, spring in enumerate(self.layout.springs):
-            if spring.turns not in made:
-                made[spring.turns] = antenna_parts.spring(self.layout, n)
-        return tuple(made[spring.turns] for spring in self.layout.springs)
-
     def placed(self, angles: Sequence[float] = (), springs: bool = True) -> list[Placed]:
         """All parts, hinge by hinge from the base, in the frame of the first hinge.
 
         Args:
             angles: Angle of each hinge [rad]; straight if not given.
-            springs: Whether the springs are among them, as they are at rest.
+            springs: Whether the springs are among them, wound by the angles.
         """
         angles = tuple(angles) or (0.0,) * self.hinges
         bracket, turn = self.standing
@@ -105,7 +96,8 @@ class AntennaSolids:
         at, heading = (0.0, 0.0), 0.0
         for n, name in enumerate(self.names):
             if springs:
-                parts.append(self._put(f"spring_{n + 1}", "spring", self.springs[n], at, heading))
+                spring = antenna_parts.spring(self.layout, n, angles[n])
+                parts.append(self._put(f"spring_{n + 1}", "spring", spring, at, heading))
             parts.append(self._put(f"pin_{n + 1}", "pin", self.printed["pin"], at, heading))
             heading += angles[n]
             parts.append(self._put(f"segment_{n + 1}", name, self.printed[name], at, heading))

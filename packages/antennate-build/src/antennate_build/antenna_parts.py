@@ -233,10 +233,11 @@ def pin(layout: AntennaLayout) -> Solid:
     return kernel.cut(whole, kernel.block((-9, 9), (flat - 9, flat), (-99, 99)))
 
 
-def spring(layout: AntennaLayout, number: int) -> Solid:
-    """A spring about its hinge, which is straight."""
+def spring(layout: AntennaLayout, number: int, angle: float = 0.0) -> Solid:
+    """A spring about its hinge, which is bent by an angle [rad]; its diameter is that at rest."""
     body = layout.springs[number]
-    return kernel.coil(body.coil / 2.0, body.wire, body.turns, (body.leg, body.leg))
+    turns = body.turns + angle / math.tau
+    return kernel.coil(body.coil / 2.0, body.wire, turns, (body.leg, body.leg))
 
 
 def bracket(layout: AntennaLayout, mount: Mount, turn: float = 0.0) -> Solid:

@@ -22,6 +22,8 @@ END = ((1.0, 0.0, 0.0), (0.0, 0.0, 1.0))
 OBLIQUE = ((-0.45, -0.75, 0.5), (0.0, 0.0, 1.0))
 PALE = {"printed": "#F6E3C5", "spring": "#C9D3DC", "pin": "#CFE0F2", "cover": "#CFE8D2"}
 """Colours of parts in pictures."""
+WIRE = "#5B6B78"
+"""Colour of springs that are drawn without edges."""
 
 
 def spring_rows(springs: tuple[Spring, ...]) -> list[list[str]]:
@@ -79,6 +81,8 @@ def antenna_sheet(antenna: AntennaSolids) -> Figure:
     ):
         view = View(axes, (left, at), scale, eye, up)
         view.draw(whole)
+        if (eye, up) == SIDE:
+            _springs_in_sight(antenna, view)
         sheet.text(axes, (14.0, at + 33.0 - 14.0 * (at < 220)), words, weight="bold")
     _whole_sizes(
         antenna, View(axes, (left, 248.0), scale, *TOP), View(axes, (left, 200.0), scale, *SIDE)
@@ -93,6 +97,14 @@ def antenna_sheet(antenna: AntennaSolids) -> Figure:
     )
     _section_table(antenna, axes)
     return figure
+
+
+def _springs_in_sight(antenna: AntennaSolids, view: View) -> None:
+    """Draw the springs between the arms, whose legs end in the segments."""
+    for n, body in enumerate(antenna.layout.springs):
+        path = sheet.helix(body.coil / 2, body.wire, body.turns, antenna.layout.hinge.clear)
+        place = np.array([n * antenna.layout.length, 0.0, 0.0])
+        view.wire(path + place, body.wire, PALE["spring"])
 
 
 def _scale(length: float) -> float:
@@ -208,7 +220,7 @@ def bracket_sheet(antenna: AntennaSolids) -> Figure:
     title = "Bracket" if name == "bracket" else "Bracket, right"
     figure, axes = sheet.new(sheet.A4, title, notes)
     height = flange.hinge_height(layout, mount, layout.antenna.roll)
-    above = View(axes, (80.0, 160.0), scale, *TOP)
+    above = View(axes, (80.0, 152.0), scale, *TOP)
     above.draw(part, hidden=True)
     side = View(axes, (80.0, 84.0), scale, *SIDE)
     side.draw(part, hidden=True)
@@ -218,7 +230,7 @@ def bracket_sheet(antenna: AntennaSolids) -> Figure:
     oblique.draw(part, colour=PALE["printed"])
     radius = flange.flange_radius(layout, mount)
     (back, _), (front, _) = kernel.bounds(part)[0][:2], (radius, 0)
-    above.length((back, -radius, 0), (front, -radius, 0), (0, -8), f"{front - back:.2f}")
+    above.length((back, radius, 0), (front, radius, 0), (0, 8), f"{front - back:.2f}")
     above.radius((0, 0, 0), radius, -35, f"R {radius:.2f}")
     for n, (x, y) in enumerate(screws[:1]):
         above.radius(
@@ -245,9 +257,9 @@ def bracket_sheet(antenna: AntennaSolids) -> Figure:
         f"{kernel.bounds(part)[1][2] + height:.2f}",
     )
     end.length(
-        (0, layout.low, -height),
-        (0, layout.strip.top, -height),
-        (0, -14),
+        (0, layout.low, kernel.bounds(part)[1][2]),
+        (0, layout.strip.top, kernel.bounds(part)[1][2]),
+        (0, 7),
         f"{layout.strip.top - layout.low:.2f}",
     )
     end.length((0, -radius, -height), (0, radius, -height), (0, -7), f"{2 * radius:.2f}")
@@ -256,10 +268,11 @@ def bracket_sheet(antenna: AntennaSolids) -> Figure:
 
 @style.styled
 def exploded_sheet(antenna: AntennaSolids, steps: tuple[str, ...]) -> Figure:
-    """The first hinges taken apart, with numbers, and the steps of the assembly."""
+    """The first hinges taken apart, with letters, and the steps of the assembly."""
     layout = antenna.layout
-    figure, axes = sheet.new(sheet.A3, "Antenna: assembly", ("not to scale",))
     gap, shown = 2.0 * layout.springs[0].leg + 10.0, min(2, antenna.hinges)
+    notes = ("not to scale", f"{shown} of {antenna.hinges} segments shown")
+    figure, axes = sheet.new(sheet.A3, "Antenna: assembly", notes)
     first = flange.flange_radius(layout, antenna.mount) + gap
     scale = 330.0 / (first + shown * (layout.length + gap))
     view = View(axes, (75.0, 140.0), scale, *OBLIQUE)
@@ -284,8 +297,9 @@ def exploded_sheet(antenna: AntennaSolids, steps: tuple[str, ...]) -> Figure:
         named.setdefault(_kind(placed.part), view.place(tuple(middle)))
     for n, (kind, place) in enumerate(named.items()):
         end = (place[0] + 8.0, place[1] + (-34.0 if kind == "spring" else 38.0))
-        sheet.balloon(axes, place, end, str(n + 1))
-        sheet.text(axes, (360.0, 120.0 - 5.4 * n), f"{n + 1}   {kind}")
+        letter = "ABCDE"[n]
+        sheet.balloon(axes, place, end, letter)
+        sheet.text(axes, (360.0, 120.0 - 5.4 * n), f"{letter}   {kind}")
     for n, step in enumerate(steps):
         sheet.text(axes, (14.0, 15.0 + 5.4 * (len(steps) - 1 - n)), f"{n + 1}.  {step}")
     return figure
@@ -311,7 +325,9 @@ def _kind(part: str) -> str:
 
 def shaded(antenna: AntennaSolids, angles: tuple[float, ...]) -> Figure:
     """The antenna as one sees it, bent a little."""
-    parts = antenna.placed(angles, springs=False)
+    parts = antenna.placed(angles)
     view, figure = sheet.picture(7.0, 3.0, OBLIQUE)
-    view.scene([(p.solid, PALE.get(p.part, PALE["printed"])) for p in parts])
+    plain = [(p.solid, PALE.get(p.part, PALE["printed"])) for p in parts if p.part != "spring"]
+    wires = [(p.solid, WIRE) for p in parts if p.part == "spring"]
+    view.scene(plain, wires=wires)
     return figure

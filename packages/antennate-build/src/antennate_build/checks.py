@@ -36,11 +36,13 @@ class Check:
         name: What.
         found: What was found, in words.
         good: Whether it is as it must be.
+        warn: Whether it is good and yet to be looked at.
     """
 
     name: str
     found: str
     good: bool
+    warn: bool = False
 
 
 @dataclass(frozen=True)

@@ -96,7 +96,7 @@ def link_layout(robot: RobotSpec, params: PrintParams, head: float = 0.0) -> Lin
     if robot.legs.kind != "rolling":
         raise ConfigError(
             f"robot.legs.kind: expected rolling legs, whose links are known, found "
-            f"{robot.legs.kind}; with --what antenna an antenna is built alone"
+            f"{robot.legs.kind}; `antennate build ROBOT --what antenna` builds its antenna alone"
         )
     leg = mount_of(robot.legs.servo, "robot.legs.servo")
     yaw = mount_of(robot.yaw.servo, "robot.yaw.servo")

@@ -178,15 +178,18 @@ class View:
             )
         )
 
-    def _front(self, solid: Solid, most: float = math.inf) -> tuple[Floats, Floats, Floats]:
+    def _front(
+        self, solid: Solid, most: float = math.inf, turn: float = 0.2
+    ) -> tuple[Floats, Floats, Floats]:
         """Triangles that face the eye on the sheet, their nearness and how bright they are.
 
         Args:
             solid: The solid.
             most: Longest edge of a triangle [mm]: large ones have no nearness of their own.
+            turn: Largest angle between triangles that are neighbours on a round face [rad].
         """
         mesh, eye = (
-            kernel.mesh(solid, most / 30.0 if most < math.inf else 0.1),
+            kernel.mesh(solid, most / 30.0 if most < math.inf else 0.1, turn),
             np.array(self.eye) / np.linalg.norm(self.eye),
         )
         corners = mesh.points[mesh.triangles]
@@ -202,14 +205,21 @@ class View:
         bright = 0.62 + 0.38 * np.clip(normals @ (light / np.linalg.norm(light)), 0.0, 1.0)
         return flat, (corners @ eye).mean(axis=1), bright
 
-    def scene(self, parts: Sequence[tuple[Solid, str]], most: float = 3.0) -> None:
+    def scene(
+        self,
+        parts: Sequence[tuple[Solid, str]],
+        most: float = 3.0,
+        wires: Sequence[tuple[Solid, str]] = (),
+    ) -> None:
         """Draw coloured solids, shaded and with edges, what is near over what is far.
 
         Args:
             parts: Solids and their colours.
             most: Longest edge of a triangle [mm]; the picture takes a while if it is short.
+            wires: The same without edges, whose outlines take minutes to find.
         """
         found = [(*self._front(solid, most), to_rgb(colour)) for solid, colour in parts]
+        found += [(*self._front(solid, most, 0.6), to_rgb(colour)) for solid, colour in wires]
         flat = np.concatenate([each[0] for each in found])
         order = np.argsort(np.concatenate([each[1] for each in found]))
         colours = np.concatenate([each[2][:, None] * np.array(each[3]) for each in found])
@@ -322,7 +332,7 @@ def leader(axes: Axes, start: Floats, end: Floats, words: str) -> None:
 
 
 def balloon(axes: Axes, start: Place, end: Place, words: str) -> None:
-    """A number in a circle with a line to what it names."""
+    """A sign in a circle with a line to what it names."""
     a, b = np.array(start), np.array(end)
     way = (b - a) / np.linalg.norm(b - a)
     axes.plot(*np.array([a, b - 3.2 * way]).T, color=style.INK, lw=_THIN)

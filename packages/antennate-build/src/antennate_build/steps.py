@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from antennate_build import flange
-from antennate_build.layout import STRIPS, AntennaLayout
+from antennate_build.layout import STRIPS, AntennaLayout, segment_names
 from antennate_build.link_layout import BATTERY, LinkLayout
 from antennate_build.mounts import Mount
 
@@ -18,6 +18,12 @@ def antenna_steps(layout: AntennaLayout, mount: Mount) -> tuple[str, ...]:
     thickness = STRIPS[layout.antenna.sensor.kind][1]
     sensor = "flex sensor" if layout.antenna.sensor.kind == "flex" else "pressure strip"
     last = "pins" if count > 1 else "pin"
+    names = segment_names(layout)
+    alike = "".join(
+        f" Segment {n} is one more print of {name}."
+        for n, name in enumerate(names, 1)
+        if name in names[: n - 1]
+    )
     return (
         f"Clear the holes of the legs with a drill of {hinge.leg_hole:.1f} mm, those of the pins "
         f"with {hinge.pin + layout.print.play_mm:.1f} mm (inner arms: a pin turns freely) and "
@@ -27,7 +33,8 @@ def antenna_steps(layout: AntennaLayout, mount: Mount) -> tuple[str, ...]:
         "Push the lower leg of the stiffest spring into the hole of the bracket, up to the coil.",
         "Slide segment 1 onto the upper leg, its inner arms between those of the bracket.",
         "Push a pin from above through arms and spring, its flat towards the legs.",
-        f"So go on with springs and segments up to the tip; segment and spring {count} are last."
+        "So go on with springs and segments up to the tip; segment and spring "
+        f"{count} are last.{alike}"
         if count > 1
         else "Bend the hinge by hand to both stops.",
         f"Bend each hinge by hand to both stops. It comes back by itself; a drop of glue at the "

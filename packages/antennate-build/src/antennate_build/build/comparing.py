@@ -11,8 +11,12 @@ from antennate_build.antenna_assembly import AntennaSolids
 from antennate_build.build.config import BuildConfig
 from antennate_build.build.naming import antenna_of, links_of
 from antennate_build.build.result import Compared
+from antennate_build.checks import Check
 from antennate_build.layout import STRIPS
 from antennate_build.weights import STRIP_DENSITY
+
+LARGEST_DIFFERENCE = 0.1
+"""Difference of a mass of an antenna from its specification above which a warning tells it."""
 
 
 def compared(unit: str, specified: float, built: float) -> Compared:
@@ -47,6 +51,16 @@ def antenna_masses(antenna: AntennaSolids) -> dict[str, Compared]:
         "bracket's mass": compared("g", 1e3 * spec.base_mass, bracket),
         "antenna's inertia about its base": compared("g·mm²", rods, float(inertia)),
     }
+
+
+def mass_check(masses: Mapping[str, Compared]) -> Check:
+    """The check that an antenna weighs what is simulated; a warning where it does not."""
+    grams = {name: each for name, each in masses.items() if each.unit == "g"}
+    told = ", ".join(f"{name} {100 * each.difference:+.1f} %" for name, each in grams.items())
+    whole = next(iter(grams.values()))
+    far = any(abs(each.difference) > LARGEST_DIFFERENCE for each in grams.values())
+    found = f"{whole.built:.2f} g built, {whole.specified:.2f} g specified; {told}"
+    return Check("mass of the antenna, of the specification", found, True, far)
 
 
 def robot_masses(spec: RobotSpec, built: Mapping[str, Any]) -> dict[str, Compared]:

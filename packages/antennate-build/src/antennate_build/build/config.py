@@ -83,8 +83,10 @@ def read(path: Path) -> BuildConfig:
     """The configuration of a FILE: parameters of the command, a robot, or an antenna alone.
 
     Args:
-        path: The file, or the name of a robot.
+        path: The file, the name of a robot, or `antenna`: the default antenna alone.
     """
+    if str(path) == "antenna":
+        return BuildConfig(what="antenna")
     if str(path) in ROBOTS:
         return BuildConfig(robot=RobotSpec.named(path))
     keys = read_toml(path, LARGEST_FILE).keys()

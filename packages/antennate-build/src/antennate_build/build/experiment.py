@@ -68,7 +68,10 @@ def tables(result: BuildResult) -> Sequence[Table]:
             note="\n".join(result.apart),
         )
     )
-    checks = [(check.name, ["ok" if check.good else "NOT OK"]) for check in result.checks]
+    checks = [
+        (check.name, ["NOT OK" if not check.good else "warn" if check.warn else "ok"])
+        for check in result.checks
+    ]
     said = "\n".join(f"{check.name}: {check.found}" for check in result.checks)
     return [*found, Table("Checks", ("",), checks, said)]
 
@@ -91,6 +94,8 @@ def sentence(result: BuildResult) -> str:
     grams = sum(part.count * part.mass_g for part in result.parts.values())
     bad = [check.name for check in result.checks if not check.good]
     fit = f"these are not as they must be: {', '.join(bad)}" if bad else "all checks hold"
+    if warned := [check.name for check in result.checks if check.warn]:
+        fit += f"; look at {', '.join(warned)}"
     name, mass = next(iter(result.masses.items()))
     springs = ""
     if result.springs:

@@ -24,7 +24,13 @@ from antennate_build import (
     weights,
 )
 from antennate_build.antenna_assembly import AntennaSolids
-from antennate_build.build.comparing import antenna_grams, antenna_masses, apart, robot_masses
+from antennate_build.build.comparing import (
+    antenna_grams,
+    antenna_masses,
+    apart,
+    mass_check,
+    robot_masses,
+)
 from antennate_build.build.config import BuildConfig
 from antennate_build.build.naming import antenna_of, brackets, links_of, sheet_names
 from antennate_build.build.result import (
@@ -104,7 +110,9 @@ def made(
     result = BuildResult(
         parts=prints,
         springs=springs,
-        checks=[Checked(name=c.name, found=c.found, good=c.good) for c in product.checks],
+        checks=[
+            Checked(name=c.name, found=c.found, good=c.good, warn=c.warn) for c in product.checks
+        ],
         masses=product.masses,
         apart=[*apart(config), *product.apart],
     )
@@ -134,6 +142,7 @@ def _add_antenna(
     product.checks.append(antenna_checks.assembly_check(antenna, tick))
     product.checks += antenna_checks.spring_checks(antenna)
     product.masses |= antenna_masses(antenna)
+    product.checks.append(mass_check(product.masses))
     said = steps.antenna_steps(layout, mount)
     product.steps["Antenna"] = said
     product.figures |= {

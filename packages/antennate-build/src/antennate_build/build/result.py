@@ -63,6 +63,8 @@ class Checked:
     """What was found."""
     good: bool
     """Whether it is as it must be."""
+    warn: bool = False
+    """Whether it is good and yet to be looked at."""
 
 
 @tabular

@@ -270,7 +270,7 @@ def _antennae(robot: RobotSpec) -> list[Part]:
                 robot.antenna_count * count,
                 f"torsion spring of {turns:g} coils",
                 "antennae",
-                "stiff ones at the base",
+                "stiff ones at the base; `antennate build` gives wire and mandrel",
             )
             for turns, count in sorted(coils.items())
         ),

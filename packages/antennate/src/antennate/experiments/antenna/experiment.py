@@ -125,7 +125,10 @@ def _of_springs(found: Springs) -> tuple[Table, Table]:
     wound = Table.of(
         "Sets to wind",
         {f"{each.wire_mm:.2f} mm": each for each in found.windings[:_SETS]},
-        note="The best mandrel of each stock wire, nearest first." if found.windings else "",
+        note="The best mandrel of each stock wire, nearest first. For printed parts wind the "
+        "springs of `antennate build` instead: its pins and stops are made for them."
+        if found.windings
+        else "",
     )
     return asked, wound
 
