@@ -329,5 +329,5 @@ def shaded(antenna: AntennaSolids, angles: tuple[float, ...]) -> Figure:
     view, figure = sheet.picture(7.0, 3.0, OBLIQUE)
     plain = [(p.solid, PALE.get(p.part, PALE["printed"])) for p in parts if p.part != "spring"]
     wires = [(p.solid, WIRE) for p in parts if p.part == "spring"]
-    view.scene(plain, wires=wires)
+    view.scene(plain, 1.2, wires)
     return figure

@@ -219,7 +219,7 @@ class View:
             wires: The same without edges, whose outlines take minutes to find.
         """
         found = [(*self._front(solid, most), to_rgb(colour)) for solid, colour in parts]
-        found += [(*self._front(solid, most, 0.6), to_rgb(colour)) for solid, colour in wires]
+        found += [(*self._front(solid, most, 0.3), to_rgb(colour)) for solid, colour in wires]
         flat = np.concatenate([each[0] for each in found])
         order = np.argsort(np.concatenate([each[1] for each in found]))
         colours = np.concatenate([each[2][:, None] * np.array(each[3]) for each in found])

@@ -95,7 +95,7 @@ def sentence(result: BuildResult) -> str:
     bad = [check.name for check in result.checks if not check.good]
     fit = f"these are not as they must be: {', '.join(bad)}" if bad else "all checks hold"
     if warned := [check.name for check in result.checks if check.warn]:
-        fit += f"; look at {', '.join(warned)}"
+        fit += f"; look at: {', '.join(warned)}"
     name, mass = next(iter(result.masses.items()))
     springs = ""
     if result.springs:
