@@ -26,11 +26,11 @@ from antennate.messages import shown
 from antennate.params.base import Params, number, own_file, read_file
 from antennate.params.scene import GRAVITY
 from antennate.robots.antenna import BASE, AntennaSpec
-from antennate.robots.bodies import BodyParams
 from antennate.robots.imu import ImuParams
 from antennate.robots.joints import (
     STRAIGHT,
     BaseParams,
+    BodyParams,
     ElevationParams,
     JointParams,
     LegParams,
