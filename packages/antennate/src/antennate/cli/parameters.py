@@ -28,7 +28,7 @@ Every physical number: its default with its unit, what it means and where it com
 begins with `paper` (arXiv:2603.07795), `datasheet`, `measured`, `fitted` or `assumed` (the paper
 does not say).
 """
-_ROBOTS = ("spec", "bodies", "joints", "servos", "antenna", "imu")
+_ROBOTS = ("spec", "joints", "servos", "antenna", "imu")
 """Modules of `antennate.robots` that describe robots."""
 _HARDWARE = (
     robot_file.RobotFile,
