@@ -145,7 +145,9 @@ def ends(successes: int, trials: int) -> str:
 
 def table() -> None:
     """Write the table of the page."""
-    walls, tunnels = read("wall")["cells"], read("tunnel")["cells"]
+    walls = read("wall")["cells"]
+    ran = (HERE / "lengths_tunnel.json").exists()
+    tunnels = read("tunnel")["cells"] if ran else {}
     crossed = {
         (name, controller): np.array([row["outcome"] == "success" for row in rows])
         for name, cells in tunnels.items()
@@ -164,7 +166,7 @@ def table() -> None:
     ]
     raised = dict(zip(others, holm([pair.mcnemar_p for pair in pairs]), strict=True))
     heads = ("antenna", "base at the wall", *PROFILES, "largest hinge, descending")
-    heads = (*heads, *(f"tunnel, `{c}`" for c in CONTROLLERS))
+    heads = (*heads, *(f"tunnel, `{c}`" for c in CONTROLLERS if ran))
     lines = [f"| {' | '.join(heads)} |", "|" + " --- |" * len(heads)]
     for name, design in ANTENNAE.items():
         ((angle, cell),) = walls[name].items()
@@ -172,7 +174,7 @@ def table() -> None:
         passed = [ends(cell[p]["successes"], cell[p]["trials"]) for p in PROFILES]
         most = cell["descending"]["hinge_max_deg"]
         line = [words, f"{angle}°", *passed, f"{most:.0f}°"]
-        for controller in CONTROLLERS:
+        for controller in tunnels.get(name, ()):
             p = raised.get((name, controller))
             text = ends(int(crossed[name, controller].sum()), int(valid[name, controller].sum()))
             line.append(text + (f", p = {p:.2g}" if p is not None else ""))
