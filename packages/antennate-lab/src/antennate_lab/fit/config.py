@@ -33,7 +33,9 @@ class FitConfig(Params):
         ROBOTS[0], "1", "assumed: the default robot", metavar="NAME|FILE", examples=list(ROBOTS)
     )
     """Robot that was driven: a name, or a TOML file of a robot, which may be a `robot.toml`."""
-    servo: ServoName | None = number(None, "1", "assumed: has to be named with recordings")
+    servo: ServoName | None = number(
+        None, "1", "assumed: has to be named with recordings", metavar="MODEL"
+    )
     """Model of the servo that was recorded; logs name theirs."""
     leave_out: tuple[str, ...] = number(
         (), "1", "assumed: the walks at the middle one of the frequencies", metavar="STEP"
