@@ -27,6 +27,7 @@ NEEDS = {
     "--ros-domain": ["--ros"],
     "--ros-network": ["--ros"],
     "--scene": ["--export mjcf"],
+    "--log": ["--compare"],
     "--seed": ["--scene"],
     "--slurm": ["--engine slurm"],
     "--teleop.gamepad-silence": ["--gamepad"],

@@ -93,7 +93,7 @@ def test_a_run_leaves_a_page_with_everything() -> None:
     assert sentence in page.text
     assert "antennate antenna --coil-mm 4 --out run" in page.text
     assert antennate.__version__ in page.text
-    assert page.tags.count("img") == len(list(Path("run/figures").glob("*.svg"))) == 4
+    assert page.tags.count("img") == len(list(Path("run/figures").glob("*.svg"))) == 6
     assert "prefers-color-scheme: dark" in page.source
     assert "@media print" in page.source
     assert "></pre>" not in page.source, "an empty box"
@@ -227,7 +227,7 @@ def test_two_runs_stand_side_by_side(run: Path, refused: Callable[..., str]) -> 
     page = Page(Path("comparison.html"))
     assert page.alone
     assert "coil_mm3.64.0" in page.text.replace("\n", "")
-    assert page.tags.count("img") == 8
+    assert page.tags.count("img") == 12
     stiffness = [
         json.loads(Path(f"coil-{coil}/result.json").read_text())["springs"]["springs"][0]
         for coil in ("3.6", "4")

@@ -79,7 +79,7 @@ def test_a_list_says_the_speed_of_a_servo() -> None:
             "xl330-m288",
             "expected ID:MODEL[@BAUD][xCOUNT], such as 1:xl330-m288, found 'xl330-m288'",
         ),
-        ("1:xl33-m288", "expected as model one of xc430-w240, xl330-m288, xl430-w250, found"),
+        ("1:xl33-m288", "expected as model one of xc330-m181, xc330-m288, xc330-t181, "),
         ("1:xl330-m288@1234", "expected as speed of xl330-m288 one of 9600, 57600"),
         ("1:xl330-m288x0", "expected servos, found none"),
         ("253:xl330-m288", "expected an id from 0 to 252, found 253"),

@@ -199,7 +199,9 @@ class RobotSpec(Params):
             }
         if self.imu == ImuParams():
             table.pop("imu", None)
-        for name in ("fitted", "bodies", "meshes"):
+        if not self.fitted:
+            table.pop("fitted", None)
+        for name in ("bodies", "meshes"):
             if not table.get(name, True):
                 del table[name]
         return table
