@@ -113,6 +113,7 @@ def test_the_drawing_is_to_scale(coils: tuple[float, ...]) -> None:
     assert (f"{coils[-1]:g} coils\n{WIRE * (coils[-1] + 1):.1f} tall" in texts) == (len(coils) < 13)
 
 
+@pytest.mark.ci
 def test_coils_that_overlap_are_told_and_many_springs_fit_the_figures(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -128,6 +129,7 @@ def test_coils_that_overlap_are_told_and_many_springs_fit_the_figures(
     assert not any("overlap" in text for text in texts)
 
 
+@pytest.mark.ci
 def test_the_command_draws_and_says_what_the_antenna_bears(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -80,6 +80,7 @@ def test_joint_that_nobody_touched_is_as_fitted(tmp_path: Path) -> None:
     assert row.cure == ""
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize(
     ("change", "name", "value", "error"),
     [

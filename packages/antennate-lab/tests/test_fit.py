@@ -63,6 +63,7 @@ def of_joint(name: str) -> Callable[[Step, Floats], Floats]:
     return measured
 
 
+@pytest.mark.ci
 def test_numbers_of_a_joint_alone_are_those_of_a_formula(tmp_path: Path) -> None:
     """The air: a log whose leg follows a linear equation is fitted by the whole simulation."""
     protocol = sweeps(SMALL, "leg_l0", seconds=2.0)
@@ -160,6 +161,7 @@ def test_backlash_drives_what_a_simulation_feels() -> None:
     assert abs(slack - tight)[:, 2].max() > 0.02
 
 
+@pytest.mark.ci
 def test_a_fit_tells_how_far_it_is_before_the_air_is_done(tmp_path: Path) -> None:
     """A line stands for each tenth: one when the search has its start, one for its first round."""
     path = write(tmp_path / "drive.mcap", SMALL, sweeps(SMALL, "leg_l0", seconds=0.5))

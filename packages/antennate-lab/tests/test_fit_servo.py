@@ -32,6 +32,7 @@ def fitted(
     return run.outcome, RobotSpec.named(folder / "robot.toml")
 
 
+@pytest.mark.ci
 def test_servo_of_the_twin_is_found_from_two_recordings(tmp_path: Path) -> None:
     """The twin's motor is another implementation, with the 128 of the manual and no friction."""
     files = [of_twin(tmp_path / f"{gain}.json", 1200, gain, 1.0, 1.6) for gain in (300, 500)]
@@ -64,6 +65,7 @@ def test_servo_of_the_twin_is_found_from_two_recordings(tmp_path: Path) -> None:
         assert step.error_deg < 0.2 < step.error_before_deg
 
 
+@pytest.mark.ci
 def test_command_that_is_printed_names_the_file_that_was_written(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
