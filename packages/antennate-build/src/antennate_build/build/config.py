@@ -31,7 +31,8 @@ _READ = {
     f"robot.{name}"
     for name in (
         *("baud", "leg_eccentricity", "leg_mass", "leg_radius", "leg_width", "link_pitch"),
-        *("links", "mass", "width", "imu.kind", "legs.kind", "pitch.kind", "pitch.limit"),
+        *("links", "mass", "width", "fitted", "imu.kind", "legs.kind", "pitch.kind"),
+        "pitch.limit",
         *("yaw.limit", "antennae.kind", "antennae.limit", "elevation.kind", "elevation.mass"),
         *(f"{group}.ids" for group in ("yaw", "legs", "antennae", "pitch", "elevation")),
         *(f"{group}.servo" for group in ("yaw", "legs", "antennae", "pitch", "elevation")),
