@@ -264,8 +264,8 @@ def trials(folder: Path, rounds: int, workers: int, smoke: bool, frequency: floa
             print(done, flush=True)
 
 
-def times_of(folder: Path) -> tuple[dict[str, Floats], dict[str, dict[str, Any]]]:
-    """Times of each rival [s], shape (scenes, draws), NaN if invalid, and how many were right.
+def times_of(folder: Path) -> tuple[dict[str, Floats], dict[str, dict[str, Any]], list[int]]:
+    """Times of each rival [s], shape (scenes, draws), NaN if invalid; how many were right; seeds.
 
     A failure counts as the limit. Draws are those that all needed rivals have done; an optional
     one that has done fewer has NaN for the rest.
@@ -289,7 +289,7 @@ def times_of(folder: Path) -> tuple[dict[str, Floats], dict[str, dict[str, Any]]
             [[time_of(own[s, *d]) if d in whole else math.nan for d in draws] for s in SCENES]
         )
         told[name] = shares([own[s, *draw]["decisions"] for s in SCENES for draw in whole])
-    return times, told
+    return times, told, sorted({seed for seed, _ in draws})
 
 
 def time_of(row: dict[str, Any]) -> float:
@@ -340,7 +340,7 @@ def chance_of(name: str, times: Any) -> str:
 
 def table(folder: Path) -> None:
     """Write the numbers, the figure and the table of the page."""
-    times, told = times_of(folder)
+    times, told, seeds = times_of(folder)
     paces = {json.loads(path.read_text())["frequency_hz"] for path in folder.glob("*.json")}
     if len(paces) != 1:
         sys.exit(f"expected a folder of one pace, found {sorted(paces)} Hz")
@@ -348,7 +348,7 @@ def table(folder: Path) -> None:
     if not count:
         sys.exit("expected a draw that all rivals have done, found none")
     result = {
-        "seeds": SEEDS,
+        "seeds": seeds,
         "draws": count,
         "limit_s": LIMIT,
         "frequency_hz": paces.pop(),

@@ -39,7 +39,6 @@ _CAUSES = {
 }
 _OF_SERVO = {"lag": "delay", "gain": "gain_divisor", "friction": "friction"}
 _FACTORS = {"lag": 1e3, "friction": 1.0, "backlash": float(np.degrees(1.0))}
-_ROUNDS = 10
 
 
 @dataclass(frozen=True)
@@ -173,7 +172,7 @@ def _joint(robot: RobotSpec, course: Course) -> list[Compared]:
     problem = least_squares.Problem(robot, [course], parameters(robot, free.values()), Workers(1))
     if not any(each.name in known for each in problem.chosen):
         return [Compared(kind, None, None) for kind in free] + absent
-    solution = least_squares.solve(problem, problem.start, _ROUNDS)
+    solution = least_squares.solve(problem, problem.start)
     errors = least_squares.covariances(problem, solution, np.random.default_rng(0))
     found = zip(free, of_air(problem, solution, *errors), strict=True)
     return [_compared(kind, each, known.get(each.parameter.name)) for kind, each in found] + absent
