@@ -125,7 +125,7 @@ def floors(problem: Problem, x: Floats) -> Floats:
         elif each.path == BACKLASH:
             limits.append(ROUNDING)
         elif name == "friction":
-            limits.append(ROUNDING * robot.servos.of(group).stiffness)
+            limits.append(ROUNDING * getattr(robot.servos, group).stiffness)
         else:
             swing = float(swings[told].max(initial=1e-9))
             limits.append(float(np.hypot(SHARE, ROUNDING / swing)))

@@ -107,7 +107,7 @@ def unknown(numbers: UnknownNumbers, configured: float, measured: float | None) 
     alone.sharex(draws)
     _draw_draws(draws, numbers)
     _draw_alone(alone, numbers)
-    rows = np.arange(len(numbers.parameters))
+    rows = np.arange(len(numbers.parameters), dtype=float)
     title = "Each alone;\ngrey is the run as configured"
     _mark(alone, configured, rows, color=style.MUTED, linewidth=1.5)
     if measured is not None:

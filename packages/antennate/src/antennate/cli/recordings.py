@@ -131,8 +131,9 @@ def recordings(config: DriveConfig, tell: Path | None) -> Iterator[Recordings]:
 @contextlib.contextmanager
 def _confirmations(by_time: bool) -> Iterator[Callable[[], bool] | None]:
     """Yield what says whether a key came since its last call; None where there are no keys."""
-    keys = not by_time and sys.stdin is not None and sys.stdin.isatty()
-    if not keys or os.tcgetpgrp(sys.stdin.fileno()) != os.getpgrp():  # not in the foreground
+    keys = None if by_time else sys.stdin
+    foreground = keys and keys.isatty() and os.tcgetpgrp(keys.fileno()) == os.getpgrp()
+    if not foreground:
         yield None
         return
     with typed_keys() as read:

@@ -65,11 +65,12 @@ def transforms(places: Floats, parents: Sequence[int]) -> Floats:
         places: Of `LinkFrames.places`.
         parents: Of `LinkFrames`.
     """
-    turned = Rotation.from_quat(places[:, [4, 5, 6, 3]])
+    quaternions = places[:, [4, 5, 6, 3]]
+    turned = Rotation.from_quat(quaternions)
     made = np.concatenate([places[:, :3], turned.as_quat()], axis=1)
     carried = np.flatnonzero(np.array(parents) >= 0)
     above = np.array(parents)[carried]
-    back = turned[above].inv()
+    back = Rotation.from_quat(quaternions[above]).inv()
     made[carried, :3] = back.apply(places[carried, :3] - places[above, :3])
-    made[carried, 3:] = (back * turned[carried]).as_quat()
+    made[carried, 3:] = (back * Rotation.from_quat(quaternions[carried])).as_quat()
     return made

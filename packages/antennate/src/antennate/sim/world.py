@@ -250,12 +250,12 @@ class World:
             which: Servos that it is done for, in the order of `command`, shape (n,); or all.
             goals: The goals [rad], shape (n,); those of the last command by default.
         """
-        goals = self._ctrl[self._drive] if goals is None else goals
+        asked = self._ctrl[self._drive] if goals is None else goals
         for i in np.flatnonzero(self._late & which).tolist():
             servo = self._drive[i]
             samples = self.model.actuator_history[servo, 0]
             before = self.t + self.model.opt.timestep * np.arange(-samples, 0.0)[:, None]
-            held = np.full((samples, 1), goals[i])
+            held = np.full((samples, 1), asked[i])
             mujoco.mj_initCtrlHistory(self.model, self.data, servo, before, held)
 
     def drives(self) -> Floats:

@@ -236,7 +236,9 @@ def ticks_of(columns: Columns, first: int) -> Iterator[Tick]:
     """Ticks one by one, from this number on; what is missing has its default in all of them."""
     rows = zip(*(column.tolist() for column in columns.values()), strict=True)
     for number, row in enumerate(rows, first):
-        yield Tick(**dict(zip(columns, row, strict=True)) | {"number": number})
+        values: dict[str, Any] = dict(zip(columns, row, strict=True))
+        values["number"] = number
+        yield Tick(**values)
 
 
 def uniform(columns: Columns) -> bool:
@@ -316,7 +318,7 @@ def decided(controller: Controller, decision: Decision, frame: AntennaFrame) -> 
     }
 
 
-def felt(frame: AntennaFrame | None) -> dict[str, tuple[float, ...]]:
+def felt(frame: AntennaFrame | None) -> dict[str, Any]:
     """What an inertial sensor gives, if the frame of one robot holds any."""
     if frame is None or not frame.angular_velocity.size:
         return {}

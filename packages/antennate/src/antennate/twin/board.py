@@ -260,8 +260,9 @@ def _read_touch(
     return SIDES.index(match[1]), press, length, float(match[5] or 0.0)
 
 
-@lru_cache(maxsize=64)
-def _press(antenna: AntennaSpec, mark: float, flex: float | None = None, way: float = 0.0) -> Press:
+def _pressed(
+    antenna: AntennaSpec, mark: float, flex: float | None = None, way: float = 0.0
+) -> Press:
     """The press at a place [m] that gives a flex [rad] or moves it aside [m], by the statics."""
     chain = Chain.of(antenna)
     if not 0.0 < mark <= chain.length:
@@ -284,6 +285,10 @@ def _press(antenna: AntennaSpec, mark: float, flex: float | None = None, way: fl
     rising = slice(most + 1)
     flex, load = (float(np.interp(way, ways[rising], each[rising])) for each in (flexes, loads))
     return Press(flex, load, mark)
+
+
+_press: Callable[..., Press] = lru_cache(maxsize=64)(_pressed)
+"""Kept, as it takes 50 ms; frozen models have a hash, which type checkers do not see."""
 
 
 _ALIVE = 0.1

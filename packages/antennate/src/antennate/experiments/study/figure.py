@@ -234,7 +234,7 @@ def _draw_lines(result: StudyResult) -> Figure:
 def _shifts(count: int, places: Sequence[float]) -> Floats:
     """How far aside of its place each condition stands, so that none covers another."""
     width = float(max(places) - min(places)) or 1.0
-    return _ASIDE * width * (np.arange(count) - (count - 1) / 2)
+    return _ASIDE * width * (np.arange(count, dtype=float) - (count - 1) / 2)
 
 
 def _scaled(cell: Cell, scale: float) -> dict[str, Any]:

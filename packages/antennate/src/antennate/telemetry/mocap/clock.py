@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from scipy import optimize, signal
@@ -187,7 +188,7 @@ def _half_intervals(jacobian: Floats, residual: Floats, t: Floats) -> Floats:
     count = int(np.clip(np.ptp(t) / _BLOCK, _FEWEST, _MOST))
     slopes = residual / np.sqrt(1 + residual**2)
     curved = jacobian * ((1 + residual**2) ** -1.5)[:, None]
-    whole, left = curved.T @ jacobian, list[Floats]()
+    whole, left = curved.T @ jacobian, list[Any]()
     for block in np.array_split(np.arange(len(t)), count):
         rest = whole - curved[block].T @ jacobian[block]
         left.append(np.linalg.solve(rest, jacobian[block].T @ slopes[block]))

@@ -67,9 +67,13 @@ def message_type(name: str, schema: str) -> Any:
 
 def _of_bytes(kind: Any) -> Any:
     """The type, whose messages are now the bytes that they are sent as."""
+
+    def deserialize(kind: Any, data: bytes, **how: Any) -> Any:
+        return kind(data)
+
     kind.__init__ = lambda message, data: setattr(message, "data", data)
     kind.serialize = lambda message, **how: message.data
-    kind.deserialize = classmethod(lambda kind, data, **how: kind(data))
+    kind.deserialize = classmethod(deserialize)
     return kind
 
 
