@@ -3,12 +3,14 @@
     python examples/imitate.py --out my_policy                   # some 35 minutes on one core
     antennate tunnel --controllers timed my_policy/policy.onnx --robot.legs.fastest 6.29
 
-It walks at 1 Hz, on a robot with faster legs than ours, which keeps up to 0.837 Hz.
+It walks at 1 Hz, on a robot with faster legs than ours, which keeps up to 0.837 Hz: `--frequency
+0.8` teaches one that the legs keep, `--robot FILE` one with other antennae.
 Needs the extra `gym` and PyTorch (CPU), and the extra `onnx` to write the file.
 The teacher is the search of `geometric`, its ways and angles by a faster gait. The student learns
 on its own episodes (DAgger: Ross, Gordon and Bagnell 2011, arXiv:1011.0686): it walks, at first in
 turns with the teacher; the teacher says at each decision how to go on after what the student did;
-the student learns all that it was told, and what the teacher goes by.
+the student learns all that it was told, and what the teacher goes by. With `--teacher-knows side`
+the teacher is told the side on which the way goes on, and the student learns to say that, too.
 """
 
 from __future__ import annotations
@@ -26,18 +28,18 @@ import antennate.envs  # registers the environments
 from antennate.control.conditioning import RepetitionDetector
 from antennate.control.escape import Search
 from antennate.control.geometric import TwoGaits, sizes_of
+from antennate.control.knowledge import Knowledge
 from antennate.control.policy.contract import contract_of
 from antennate.control.policy.writer import write_policy
+from antennate.errors import ConfigError
+from antennate.params.base import put_over
 from antennate.params.control import ControlParams
 from antennate.robots.spec import RobotSpec
 
 SCENES = {scene: name for name, scene in antennate.envs.ids().items()}
 FREQUENCY = 1.0
-"""Gait cycles a second [Hz]."""
-ROBOT = {"legs": {"fastest": 6.29}}
-"""Legs that keep up with that: 2 pi of it [rad/s]."""
+"""Gait cycles a second [Hz], unless another is asked for."""
 INTERFACE = {"action": "gait", "ticks": 20, "history": 10, "memory_time": 30.0}
-INTERFACE["frequency"] = (0.2, FREQUENCY)
 """A decision every 0.2 s, a fifth of a gait cycle; what was felt and done in the last two."""
 DECISION, WINDOW, PATIENCE = 0.2, 0.8, 3
 """Time of a decision [s]; gait cycles in which readings repeat; decisions of another will."""
@@ -60,12 +62,24 @@ TEACHING = 0.45
 """Share of the time in which the teacher walks less and less, down to never."""
 UNITS, GROUP, RATE, EPOCHS = 128, 8, 2e-3, 2
 """Units of the memory; robots of a batch; step size; trainings over all that was told a round."""
-MIRROR = np.array([-1, -1, 1, 1, 1, 1], np.float32)
-"""What the teacher goes by, once left and right are exchanged, shape (6,)."""
+MIRROR = np.array([-1, -1, 1, 1, 1, 1, -1], np.float32)
+"""What the teacher goes by, once left and right are exchanged, shape (7,)."""
+
+
+def interface_of(frequency: float) -> dict:
+    """Interface of a student that walks at a frequency [Hz] at most."""
+    return INTERFACE | {"frequency": (0.2, frequency)}
+
+
+def robot_of(name: str, frequency: float) -> RobotSpec:
+    """The robot of a name or file, with legs that keep up with a frequency [Hz]."""
+    robot = RobotSpec.named(name)
+    legs = {"fastest": max(robot.legs.fastest, round(2.0 * np.pi * frequency + 0.005, 2))}
+    return RobotSpec.model_validate(put_over(robot.model_dump(), {"legs": legs}))
 
 
 class Teacher(Search):
-    """The search of `geometric` at 1 Hz, told what the student did.
+    """The search of `geometric` at a frequency, told what the student did.
 
     Its clock stands still while the student does something else than it was told. After PATIENCE
     decisions of that it goes on as if it had wanted that itself.
@@ -74,16 +88,19 @@ class Teacher(Search):
         control: All numbers of the control.
         robot: The robot that walks and turns.
         batch: Number of robots B.
+        frequency: Gait cycles a second [Hz].
     """
 
-    def __init__(self, control: ControlParams, robot: RobotSpec, batch: int) -> None:
-        gait = control.gait.model_copy(update={"frequency": FREQUENCY})
+    def __init__(
+        self, control: ControlParams, robot: RobotSpec, batch: int, frequency: float = FREQUENCY
+    ) -> None:
+        gait = control.gait.model_copy(update={"frequency": frequency})
         own = control.geometric.model_copy(update={"forward": "gait"})
         moves = TwoGaits(control.model_copy(update={"gait": gait, "geometric": own}), robot, 1)
         super().__init__(sizes_of(control, moves.speed, moves.turning), batch)
         repetition = control.repetition.model_copy(update={"window_cycles": WINDOW})
         self._pressure = repetition.pressure
-        self._detector = RepetitionDetector(repetition, batch, DECISION, FREQUENCY)
+        self._detector = RepetitionDetector(repetition, batch, DECISION, frequency)
         self._t = np.zeros(batch)
         self._astray = np.zeros(batch, np.int64)
 
@@ -107,13 +124,20 @@ class Teacher(Search):
         return self.maneuver.copy()
 
     def state(self) -> np.ndarray:
-        """What it goes by, shape (B, 6): turn so far, side, tries, and three times, as shares."""
+        """What it goes by, shape (B, 7).
+
+        Turn so far, side, tries, three times, as shares; and the side of the way as it is told,
+        1 to the right, 0 straight ahead or not told.
+        """
         times, walks = self._params, self.maneuver == FORWARD
         left = np.where(walks, 0.0, np.maximum(self._until - self._t, 0.0)) / times.return_time
         walked = np.nan_to_num(self._t - self._begun) * walks / times.proof_time
         free = np.clip((self._t - self._felt) / times.free_time, 0.0, 2.0) * walks
         turned, side = self._turned / times.return_time, np.where(self._right, 1.0, -1.0)
-        parts = turned, side, np.minimum(self.tries, 4) / 4, left, np.clip(walked, 0.0, 1.5), free
+        known = self.knowledge.side
+        told = np.zeros(len(side)) if known is None else -known
+        tries, walked = np.minimum(self.tries, 4) / 4, np.clip(walked, 0.0, 1.5)
+        parts = turned, side, tries, left, walked, free, told
         return np.stack(parts, axis=1).astype(np.float32)
 
     def _adopt(self, rows: np.ndarray, done: np.ndarray) -> None:
@@ -139,29 +163,36 @@ class Class:
         scene: Name of the scene.
         readings: What the student is given to read: own or none.
         seed: Of the episodes.
+        robot: The robot.
+        frequency: Gait cycles a second [Hz].
+        told: Whether the teacher knows the side.
     """
 
-    def __init__(self, scene: str, readings: str, seed: int) -> None:
-        words = {"num_envs": ROWS, "interface": INTERFACE, "autoreset_mode": "SAME_STEP"}
-        self.envs = gym.make_vec(SCENES[scene], robot=ROBOT, **words)
-        self.blind = readings == "none"
+    def __init__(
+        self, scene: str, readings: str, seed: int, robot: RobotSpec, frequency: float, told: bool
+    ) -> None:
+        words = {"num_envs": ROWS, "interface": interface_of(frequency)}
+        self.envs = gym.make_vec(SCENES[scene], robot=robot, autoreset_mode="SAME_STEP", **words)
+        self.blind, self.told = readings == "none", told
         config = self.envs.unwrapped.config
-        self.teacher = Teacher(config.control, config.robot, ROWS)
+        self.teacher = Teacher(config.control, config.robot, ROWS, frequency)
         self.done, (self.new, self.taught) = np.zeros(ROWS, np.int64), np.ones((2, ROWS), bool)
         self.memory = torch.zeros(ROWS, UNITS)
         self.slips, self.other = np.zeros((2, ROWS), np.int64)
-        self.observation, _ = self.envs.reset(seed=seed)
+        self.observation, self.info = self.envs.reset(seed=seed)
 
     def walk(self, network: Network, share: float, rng: np.random.Generator):
         """Walk a round, a share of it with the teacher; the lessons of the student.
 
-        Observations (ROUND, B, n), advice, first decisions, what the teacher went by (ROUND, B, 6).
+        Observations (ROUND, B, n), advice, first decisions, what the teacher went by (ROUND, B, 7).
         """
         lessons = []
         for i in range(ROUND):
             if i % SEGMENT == 0:
                 self.taught = rng.random(ROWS) < share
             flex = self.observation[:, [0, HISTORY]].astype(float)
+            if self.told:
+                self.teacher.knowledge = Knowledge(side=self.info["side"])
             advice = self.teacher.advise(flex, self.done)
             seen = untouched(self.observation) if self.blind else self.observation
             lessons.append((seen.copy(), advice, self.new.copy(), self.teacher.state()))
@@ -181,7 +212,8 @@ class Class:
 
     def step(self) -> None:
         """Carry out what was chosen."""
-        self.observation, _, ended, cut, _ = self.envs.step(CHOICES[self.done].astype(np.float32))
+        actions = CHOICES[self.done].astype(np.float32)
+        self.observation, _, ended, cut, self.info = self.envs.step(actions)
         self.new = ended | cut
         if self.new.any():
             self.teacher.begin(self.new)
@@ -298,7 +330,12 @@ def teach(options: argparse.Namespace) -> Path:
     torch.set_num_threads(1)
     rng, readings = np.random.default_rng(options.seed), options.readings
     first = 10_000_000 + 1000 * options.seed
-    classes = [Class(scene, readings, first + i) for i, scene in enumerate(options.scene)]
+    robot, pace = robot_of(options.robot, options.frequency), options.frequency
+    told = options.teacher_knows == "side"
+    classes = [
+        Class(scene, readings, first + i, robot, pace, told)
+        for i, scene in enumerate(options.scene)
+    ]
     network = Network(classes[0].observation.shape[1])
     if readings == "none":
         blindfold(network)
@@ -312,6 +349,7 @@ def teach(options: argparse.Namespace) -> Path:
         print(f"{minutes:.1f} min: {decisions} decisions, {100 * right:.0f} % as told", flush=True)
     lessons.train(10, RATE / 5)
     words = f"scenes {' '.join(options.scene)}, readings {readings}, seed {options.seed}"
+    words += f", robot {options.robot}, {pace:g} Hz, teacher knows {options.teacher_knows}"
     about = f"examples/imitate.py, {words}, {decisions} decisions"
     options.out.mkdir(parents=True, exist_ok=True)
     return network.save(options.out / "policy.onnx", classes[0].envs.unwrapped.config, about)
@@ -322,12 +360,18 @@ def main() -> None:
     parser.add_argument("--out", type=Path, required=True, help="folder of the policy")
     parser.add_argument("--scene", nargs="+", default=["uturn", "room"], choices=[*SCENES])
     parser.add_argument("--readings", default="own", choices=["own", "none"], help="what it feels")
+    parser.add_argument("--robot", default="scuttle", help="name or TOML file of the robot")
+    parser.add_argument("--frequency", type=float, default=FREQUENCY, help="of the gait [Hz]")
+    parser.add_argument("--teacher-knows", default="nothing", choices=["nothing", "side"])
     parser.add_argument("--decisions", type=int, default=60_000, help="600 a scene and round")
     parser.add_argument("--seed", type=int, default=1, help="of all chance")
     options = parser.parse_args()
     if options.decisions < 1:
         parser.error(f"--decisions: expected at least 1, found {options.decisions}")
-    print(teach(options))
+    try:
+        print(teach(options))
+    except ConfigError as error:
+        parser.error(str(error))
 
 
 if __name__ == "__main__":

@@ -264,6 +264,16 @@ def test_a_gait_turns_to_the_side_of_its_offset() -> None:
         assert sign * (info["head"][2] - begin["head"][2]) > 0.3
 
 
+def test_who_has_turned_from_the_route_has_it_on_the_other_side() -> None:
+    """The route of the default tunnel leads straight ahead for more than a metre at first."""
+    for offset, side in ((1.0, 1), (-1.0, -1)):  # right, left
+        env = single("Tunnel", action="gait")
+        _, begin = env.reset(seed=1)
+        for _ in range(30):
+            *_, info = env.step(np.array([0.2, offset, 0.0, 1.0], np.float32))
+        assert (begin["side"], info["side"]) == (0, side)
+
+
 def test_nothing_of_the_truth_is_observed_without_readings() -> None:
     """With readings none nothing is felt, whatever it meets."""
     env = single(readings="none")

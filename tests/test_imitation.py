@@ -48,11 +48,26 @@ def test_readings_that_repeat_are_told_to_back_off_and_to_turn_from_what_stays_b
     walked, backed = (told.count(maneuver) for maneuver in (imitate.FORWARD, imitate.REVERSE))
     assert abs(walked * imitate.DECISION - 3.0) < 0.5
     assert abs(backed * imitate.DECISION - 1.3) < 0.25
-    turned, right, tries, left, walked, free = teacher.state()[0]
+    turned, right, tries, left, walked, free, known = teacher.state()[0]
     assert (np.sign(turned), right) == ((1.0, 1.0) if side == "TURN_R" else (-1.0, -1.0))
     assert (tries, walked, free) == (0.25, 0.0, 0.0)  # the first of four; it does not walk
+    assert known == 0.0  # it is told no side
     begun = imitate.DECISION / (math.radians(60.0) / 0.67)  # of a turn, after one decision
     assert abs(left / abs(turned) - (1.0 - begun)) < 0.02
+
+
+@pytest.mark.parametrize(("side", "turn"), [(1, "TURN_L"), (-1, "TURN_R")])
+def test_a_teacher_that_knows_the_side_turns_there_whatever_is_bent(
+    imitate: Any, side: int, turn: str
+) -> None:
+    """Bent more on the side of the way, as where the antenna leans into the opening."""
+    bent = (0.6, 0.1) if side == 1 else (0.1, 0.6)
+    teacher, told = imitate.Teacher(ControlParams(), RobotSpec(), 1), [imitate.FORWARD]
+    teacher.knowledge = imitate.Knowledge(side=np.array([side]))
+    while len(told) < 100 and not {imitate.TURN_L, imitate.TURN_R} & set(told):
+        told.append(advice(teacher, bent, told[-1]))
+    assert told[-1] == getattr(imitate, turn)
+    assert teacher.state()[0, -1] == -side  # positive to the right, as all of a state
 
 
 def test_a_robot_that_feels_nothing_is_told_to_walk(imitate: Any) -> None:
@@ -83,7 +98,7 @@ class Gait:
 
 def test_a_mirrored_observation_is_that_of_the_mirrored_robot(imitate: Any) -> None:
     """Antennae exchanged, offset negated, and the gait half a turn later."""
-    interface = PolicyInterface.model_validate(imitate.INTERFACE)
+    interface = PolicyInterface.model_validate(imitate.interface_of(1.0))
     observers = [Observer(interface, ControlParams(), RobotSpec(), 1) for _ in range(2)]
     rng = np.random.default_rng(2)
     for i in range(40):
@@ -93,13 +108,13 @@ def test_a_mirrored_observation_is_that_of_the_mirrored_robot(imitate: Any) -> N
         observers[1].feel(AntennaFrame(t, counts[:, ::-1].copy()))
         own = observers[0].look(Gait(phase, offset))
         other = observers[1].look(Gait(phase + np.pi, -offset))
-    state, first = np.array([[0.5, 1.0, 0.25, 0.1, 0.0, 0.0]]), np.array([True])
+    state, first = np.array([[0.5, 1.0, 0.25, 0.1, 0.0, 0.0, 1.0]]), np.array([True])
     seen, told, begins, why = imitate.mirrored(own, np.array([imitate.TURN_L]), first, state)
     assert np.abs(seen - other).max() < 1e-6
     assert np.abs(seen - own).max() > 0.1
     assert told.tolist() == [imitate.TURN_R]
     assert begins.tolist() == [True]
-    assert why.tolist() == [[-0.5, -1.0, 0.25, 0.1, 0.0, 0.0]]
+    assert why.tolist() == [[-0.5, -1.0, 0.25, 0.1, 0.0, 0.0, -1.0]]
 
 
 def test_the_blind_twin_is_given_what_a_robot_without_readings_is(imitate: Any) -> None:
@@ -108,8 +123,8 @@ def test_the_blind_twin_is_given_what_a_robot_without_readings_is(imitate: Any) 
     for readings in ("own", "none"):
         env = imitate.gym.make(
             "antennate/Tunnel-v1",
-            robot=imitate.ROBOT,
-            interface=imitate.INTERFACE,
+            robot=imitate.robot_of("scuttle", 1.0),
+            interface=imitate.interface_of(1.0),
             readings=readings,
         )
         seen[readings], _ = env.reset(seed=5)
@@ -130,7 +145,8 @@ def test_the_blind_twin_is_given_what_a_robot_without_readings_is(imitate: Any) 
 def test_a_written_student_answers_as_it_did(imitate: Any, tmp_path: Path) -> None:
     """The file and PyTorch choose alike over 200 decisions, and remember the same to 1e-5."""
     pytest.importorskip("onnxruntime")
-    env = imitate.gym.make("antennate/Tunnel-v1", robot=imitate.ROBOT, interface=imitate.INTERFACE)
+    words = {"robot": imitate.robot_of("scuttle", 1.0), "interface": imitate.interface_of(1.0)}
+    env = imitate.gym.make("antennate/Tunnel-v1", **words)
     size, torch = env.observation_space.shape[0], imitate.torch
     torch.manual_seed(0)
     network, rng = imitate.Network(size), np.random.default_rng(0)
@@ -152,6 +168,7 @@ def test_the_example_teaches_and_its_policy_walks(tmp_path: Path) -> None:
     pytest.importorskip("onnxruntime")
     script = str(EXAMPLES / "imitate.py")
     words = [sys.executable, script, "--scene", "uturn", "--decisions", "600", "--out", "p"]
+    words += ["--robot", "scuttle", "--frequency", "0.8", "--teacher-knows", "side"]
     subprocess.run(words, cwd=tmp_path, check=True)
     path, rows = tmp_path / "p/policy.onnx", list[TrialResult]()
     config = TunnelConfig(time_limit=3.0, scene="uturn", controllers=(str(path),))

@@ -21,6 +21,7 @@ from antennate.envs.reward import terms_of
 from antennate.envs.truth import OUTCOMES, Truth, replace_rows
 from antennate.errors import SceneError
 from antennate.sim.episode import Episode
+from antennate.sim.knowledge import mean_direction, route_of, side_ahead
 from antennate.sim.scenes.scene import Scene
 from antennate.sim.sim_robot import SimRobot
 from antennate.sim.trial import Trial, draw_trial, require_room, scene_of
@@ -82,6 +83,11 @@ class Episodes:
         self._affine = config.randomise.sensor_gain != (1.0, 1.0)
         self._affine |= config.randomise.sensor_offset != (0.0, 0.0)
         self._ticks, self._most = 0, config.max_episode_steps
+        self._routes: dict[int, Floats | None] = {}
+        self._headings: dict[int, list[float]] = {}
+        frequency = config.interface.fastest_gait(control.gait.frequency) or control.gait.frequency
+        decision = control.period * config.interface.ticks
+        self._looks = max(1, round(1.0 / (frequency * decision)))
         self.size = self._observer.size
 
     @property
@@ -182,6 +188,7 @@ class Episodes:
             self._body.load(row, trial.world, trial.chance)
             self._gains[row], self._offsets[row] = gains, offsets
             self._episodes[row] = episode
+            self._routes[row], self._headings[row] = route_of(episode.scene), []
             return trial.phase
         raise SceneError(
             f"expected an episode that can begin, found {_MOST_SKIPPED} that cannot: {trouble}"
@@ -223,6 +230,9 @@ class Episodes:
             truth.head[row, :2], truth.head[row, 2] = head, world.heading
             truth.force[row] = world.obstacle_force()
             truth.maneuver[row] = self._actor.maneuver[row]
+            self._headings[row] = [*self._headings[row], world.heading][-self._looks :]
+            if (route := self._routes[row]) is not None:
+                truth.side[row] = side_ahead(route, head, mean_direction(self._headings[row]))
             if truth.outcome[row] != OUTCOMES.index("invalid"):
                 before, progress = episode.progress, episode.progress_of(head)
                 if not begins:

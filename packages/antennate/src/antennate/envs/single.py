@@ -11,7 +11,7 @@ from gymnasium.error import ResetNeeded
 from antennate.envs.episodes import Episodes
 from antennate.envs.reward import REWARD_VERSION, TERMS
 from antennate.envs.spaces import action_space, answers_of, observation_space
-from antennate.envs.truth import OUTCOMES, Truth
+from antennate.envs.truth import ONE_EACH, OUTCOMES, Truth
 from antennate.envs.vector import NotCopied, config_of, known_options, require_no_pictures, whole
 from antennate.params.base import LARGEST_SEED
 from antennate.sim.world import World
@@ -77,10 +77,7 @@ class AntennaEnv(NotCopied, Env[Any, Any]):
 
 def _info(truth: Truth) -> dict[str, Any]:
     """The truth about the first row, and how its episode ended if it did."""
-    info: dict[str, Any] = {
-        name: getattr(truth, name)[0].item()
-        for name in ("seed", "episode_number", "t", "progress", "length", "force", "maneuver")
-    }
+    info: dict[str, Any] = {name: getattr(truth, name)[0].item() for name in ONE_EACH}
     info["head"] = truth.head[0].copy()
     info |= {f"reward_{term.name}": float(truth.terms[0, i]) for i, term in enumerate(TERMS)}
     if truth.outcome[0] >= 0:

@@ -12,6 +12,8 @@ from antennate.sim.episode import Outcome
 from antennate.types import Bools, Floats, Ints
 
 OUTCOMES: tuple[Outcome, ...] = get_args(Outcome)
+ONE_EACH = "seed", "episode_number", "t", "progress", "length", "side", "force", "maneuver"
+"""Parts of a `Truth` that are one number of each robot."""
 
 
 @dataclass(slots=True)
@@ -23,6 +25,8 @@ class Truth:
         t: Time since the start [s], shape (B,).
         head: Position and heading of the head [m, m, rad], shape (B, 3).
         progress: How far the head has come [m], shape (B,); `length` is that of the exit.
+        side: Side of the route 0.6 m ahead from the mean heading of the last gait cycle: +1 left,
+            -1 right, 0 straight ahead or a scene without a route, shape (B,).
         force: Sum of the normal forces on the robot [N], shape (B,).
         maneuver: What was done, a `Maneuver`, shape (B,).
         terms: Terms of the reward in the order of `TERMS`, shape (B, terms).
@@ -36,6 +40,7 @@ class Truth:
     head: Floats
     progress: Floats
     length: Floats
+    side: Ints
     force: Floats
     maneuver: Ints
     terms: Floats
@@ -45,13 +50,13 @@ class Truth:
     @classmethod
     def empty(cls, batch: int) -> Truth:
         """Truth of rows without an episode."""
-        whole = (np.zeros(batch, np.int64) for _ in range(3))
+        whole = (np.zeros(batch, np.int64) for _ in range(4))
         real = (np.zeros(batch) for _ in range(4))
-        seed, episode, maneuver = whole
+        seed, episode, side, maneuver = whole
         t, progress, length, force = real
         head, terms = np.zeros((batch, 3)), np.zeros((batch, len(TERMS)))
         outcome = np.full(batch, -1)
-        return cls(seed, episode, t, head, progress, length, force, maneuver, terms, outcome)
+        return cls(seed, episode, t, head, progress, length, side, force, maneuver, terms, outcome)
 
 
 def replace_rows(truth: Truth, other: Truth, rows: Bools) -> Truth:

@@ -15,7 +15,7 @@ from antennate.envs.config import EnvConfig
 from antennate.envs.episodes import Episodes
 from antennate.envs.reward import REWARD_VERSION, TERMS
 from antennate.envs.spaces import action_space, answers_of, observation_space
-from antennate.envs.truth import OUTCOMES, Truth
+from antennate.envs.truth import ONE_EACH, OUTCOMES, Truth
 from antennate.errors import ConfigError
 from antennate.messages import nearest, shown
 from antennate.params.base import LARGEST_SEED, from_values
@@ -262,19 +262,7 @@ def _mask(mask: Any, batch: int) -> Bools:
 
 def _infos(truth: Truth, rows: Bools, ended: Bools) -> dict[str, Any]:
     """The truth about some rows as infos of a vector: arrays, and masks of what they hold."""
-    infos: dict[str, Any] = {
-        name: getattr(truth, name).copy()
-        for name in (
-            "seed",
-            "episode_number",
-            "t",
-            "head",
-            "progress",
-            "length",
-            "force",
-            "maneuver",
-        )
-    }
+    infos: dict[str, Any] = {name: getattr(truth, name).copy() for name in ("head", *ONE_EACH)}
     infos |= {f"reward_{term.name}": truth.terms[:, i].copy() for i, term in enumerate(TERMS)}
     infos |= {f"_{name}": rows.copy() for name in [*infos]}
     if ended.any():

@@ -43,7 +43,7 @@ ON_ROUTE: tuple[Kind, ...] = ("side", "facing", "map")
 def require_route(name: str, scene: SceneInstance, kinds: Sequence[Kind]) -> None:
     """Check that a scene has the route from which these kinds follow."""
     lacking = [kind for kind in kinds if kind in ON_ROUTE]
-    if lacking and _route_of(scene) is None:
+    if lacking and route_of(scene) is None:
         raise SceneError(
             f"scene {name!r}: expected a centre line as `route`, an array of shape (n, 2), for the "
             f"knowledge of {', '.join(lacking)}, found none"
@@ -74,7 +74,7 @@ class Truths:
 
     def begin(self, row: int, scene: SceneInstance) -> None:
         """A trial begins in a row."""
-        self._routes[row], self._ticks[row] = _route_of(scene), 0
+        self._routes[row], self._ticks[row] = route_of(scene), 0
         self._walked[row], self._headings[row] = [], []
         self._rises[row] = np.array([e.x for e in getattr(scene, "edges", ()) if e.rise > 0.0])
 
@@ -202,7 +202,7 @@ def _place(route: Floats, at: float) -> tuple[Floats, Floats]:
     return route[i + 1] + (at - ends[i]) * direction, direction
 
 
-def _route_of(scene: SceneInstance) -> Floats | None:
+def route_of(scene: SceneInstance) -> Floats | None:
     """Corners of the centre line of a scene [m], shape (n, 2), None if it has none."""
     try:
         line: Any = getattr(scene, "route", None)
