@@ -21,13 +21,13 @@ from antennate.params.control import ControlParams
 from antennate.robots.spec import RobotSpec
 from antennate.types import AntennaFrame
 
+pytest.importorskip("torch")  # here: it begins a process of its own once
+pytest.importorskip("gymnasium")
 EXAMPLES = Path(__file__).parents[1] / "examples"
 
 
 @pytest.fixture
 def imitate(monkeypatch: pytest.MonkeyPatch) -> Any:
-    pytest.importorskip("torch")
-    pytest.importorskip("gymnasium")
     monkeypatch.syspath_prepend(str(EXAMPLES))
     return importlib.import_module("imitate")
 
@@ -164,7 +164,6 @@ def test_a_written_student_answers_as_it_did(imitate: Any, tmp_path: Path) -> No
 
 @pytest.mark.slow
 def test_the_example_teaches_and_its_policy_walks(tmp_path: Path) -> None:
-    pytest.importorskip("torch")
     pytest.importorskip("onnxruntime")
     script = str(EXAMPLES / "imitate.py")
     words = [sys.executable, script, "--scene", "uturn", "--decisions", "600", "--out", "p"]
