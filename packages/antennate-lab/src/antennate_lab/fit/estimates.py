@@ -26,9 +26,9 @@ TOLD = 0.5
 """A parameter is told if its interval is narrower than this share of what was known before."""
 SHORTEST = 0.002
 """Delays up to the timestep of the physics are alike [s]."""
-SHARE = 0.01
+SHARE = 0.005
 """Share of its value by which a gain, an inertia, a spring or a factor may be off because the model
-leaves something out (assumed)."""
+and its numerics leave something out: what fits missed of two simulated robots (docs/fit.md)."""
 ROUNDING = POSITION_UNIT / 2.0
 """What the rounding of an angle hides [rad]."""
 _DRAWS = 4000

@@ -23,13 +23,15 @@ from antennate.types import Floats
 from antennate_lab.fit.parameters import Parameter, bounds
 from antennate_lab.fit.residuals import NOISE, moving
 from antennate_lab.fit.simulated import Course, simulated
+from dynamixel_bus.model import POSITION_UNIT
 
 BINS = 10
 """Parts of a cycle over which what is felt is a mean."""
 WIDER = 2.0
 """A second round draws from a distribution so many times as wide as what the first has found."""
-POSTURE = 0.003
-"""Standard deviation of what the posture at the beginning of a walk is off [rad] (assumed)."""
+POSTURE = POSITION_UNIT
+"""Standard deviation of what the posture at the beginning of a walk is off [rad] (assumed: a
+position unit of the servos)."""
 _FARTHEST = 3.5
 """A parameter is not told if the regression goes farther from what was known before [standard
 deviations]: no robot that was drawn felt the like."""
