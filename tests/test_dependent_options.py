@@ -102,7 +102,7 @@ def test_python_refuses_what_is_for_a_run_directory_without_one() -> None:
         antennate.run("antenna", resume=True)
 
 
-COMMAS = {"--files", "--recording", "--beside", "--slurm", "--compare", "--shards"}
+COMMAS = {"--files", "--poses", "--recording", "--beside", "--slurm", "--compare", "--shards"}
 """Lists of files, and what SLURM is asked for: a comma may be part of a value."""
 
 

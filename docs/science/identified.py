@@ -53,10 +53,18 @@ POSTURE = 0.002
 """Standard deviation of the joints' angles at the beginning [rad]."""
 CONTROL = ControlParams()
 _NOISY = VariationParams(joint_bias=0.0, slip_log_sd=0.0)
-_NEITHER = (math.nan, math.nan)
+_NEITHER, _NOWHERE = (math.nan, math.nan), (math.nan, math.nan, math.nan)
+BEGIN = 1000.0
+"""What the clock of motion capture shows when the log begins [s]."""
+CAPTURE = (0.0003, 0.0003, 0.005)
+"""Standard deviation of a place [m] and a heading [rad] by motion capture."""
+Pose = tuple[float, float, float]
+"""Place x, y [m] and heading [rad]."""
 
 
-def record(robot: RobotSpec, protocol: Protocol, path: Path, seed: int) -> None:
+def record(
+    robot: RobotSpec, protocol: Protocol, path: Path, seed: int, seen: Path | None = None
+) -> None:
     """Write the log of a robot that goes through a protocol.
 
     Args:
@@ -64,6 +72,7 @@ def record(robot: RobotSpec, protocol: Protocol, path: Path, seed: int) -> None:
         protocol: Made for it.
         path: The log, new.
         seed: Of the noise of its sensors.
+        seen: Table of poses of the head on the floor to write, with a clock of its own.
     """
     header = Header(
         controller="protocol",
@@ -73,24 +82,38 @@ def record(robot: RobotSpec, protocol: Protocol, path: Path, seed: int) -> None:
     )
     rng = np.random.default_rng(seed)
     with LogWriter(path, header) as log:
-        for tick in _ticks(robot, protocol, rng):
+        rows = []
+        for tick, pose in _ticks(robot, protocol, rng):
             log.write(tick)
+            rows.append((BEGIN + tick.now, *pose))
+    if seen is not None:
+        table = pd.DataFrame(rows, columns=["time", "x", "y", "heading"]).dropna()
+        chance = np.random.default_rng([seed, 2])  # what a marker is off [m], and two of them [rad]
+        table[["x", "y", "heading"]] += chance.standard_normal((len(table), 3)) * CAPTURE
+        table.to_csv(seen, index=False, lineterminator="\n")
 
 
-def _ticks(robot: RobotSpec, protocol: Protocol, rng: np.random.Generator) -> Iterator[Tick]:
-    """Ticks of the whole protocol; hanging steps and those on the floor in a world each."""
+def _ticks(
+    robot: RobotSpec, protocol: Protocol, rng: np.random.Generator
+) -> Iterator[tuple[Tick, Pose]]:
+    """Ticks of the whole protocol with the head's pose, which is NaN in the air.
+
+    Hanging steps and those on the floor have a world each.
+    """
     period, number = CONTROL.period, 0
     chance = Disturbance(rng, _NOISY, robot, period)
     for hanging in (True, False):
         steps = [step for step in protocol.steps if (step.place == "hanging") == hanging]
         sim = SimRobot(1, robot, period, PHYSICS.timestep)
         rest = np.zeros(len(robot.joint_names))
-        sim.load(0, world_of(robot, protocol.hook if hanging else None, rest), chance)
+        world = world_of(robot, protocol.hook if hanging else None, rest)
+        sim.load(0, world, chance)
         for at, (angles, events) in enumerate(_courses(steps, robot, protocol.carry), 1):
             frame, number = sim.read(), number + 1
+            pose = _NOWHERE if hanging else (*world.head[:2].tolist(), world.heading)
             sim.write(next(commands(robot, angles[None])))
             sim.sleep_until(at * period)
-            yield Tick(
+            tick = Tick(
                 number=number,
                 t=(number - 1) * period,
                 now=(number - 1) * period,
@@ -110,6 +133,7 @@ def _ticks(robot: RobotSpec, protocol: Protocol, rng: np.random.Generator) -> It
                 linear_acceleration=tuple(frame.linear_acceleration[0].tolist()),
                 events=events,
             )
+            yield tick, pose
 
 
 def _courses(

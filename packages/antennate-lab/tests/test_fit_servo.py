@@ -8,8 +8,10 @@ import shlex
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pytest
-from servo_recordings import found_of, of_twin, written
+from scipy import signal
+from servo_recordings import RATE, found_of, of_twin, written
 
 import antennate
 from antennate.cli import main
@@ -20,7 +22,7 @@ from antennate_lab.fit.servo_recordings import ServoFit
 DATA = Path(__file__).parents[4] / "shared/data"
 REAL = DATA / "servo_xl330_bam/raw"
 SERVO = "servos.xl330_m288"
-NUMBERS = ("gain_divisor", "armature", "friction", "load_friction")
+NUMBERS = ("armature", "friction", "load_friction")
 
 
 def fitted(
@@ -34,21 +36,27 @@ def fitted(
 
 @pytest.mark.ci
 def test_servo_of_the_twin_is_found_from_two_recordings(tmp_path: Path) -> None:
-    """The twin's motor is another implementation, with the 128 of the manual and no friction."""
+    """The twin's motor is another implementation, with the 128 of the manual and no friction.
+
+    Its drive is never at rest under load, so that the divisor shows over the no-load speed alone.
+    """
     files = [of_twin(tmp_path / f"{gain}.json", 1200, gain, 1.0, 1.6) for gain in (300, 500)]
     (own := tmp_path / "own.toml").write_text(
         f"[{SERVO}]\np_gain = 800.0\ndelay = 0.004\nstall_torque = 0.7  # hot\n"
     )
     fit, robot = fitted(tmp_path / "out", *files, robot=own)
     servo, true = robot.servos.xl330_m288, XL330Params()
-    assert servo.gain_divisor == pytest.approx(128.0, rel=0.02)
+    assert servo.gain_divisor == RobotSpec.named(own).servos.xl330_m288.gain_divisor
     assert servo.armature == pytest.approx(true.armature, rel=0.02)
     assert servo.friction < 0.02 * true.stall_torque
     rows = {row.name.rpartition(".")[2]: row for row in fit.rows}
     assert {name for name, row in rows.items() if row.told} == {*NUMBERS}
     assert "known weight" in rows["stall_torque"].record  # none hangs on it
     assert (servo.stall_torque, servo.p_gain, servo.delay) == (0.7, 800.0, 0.004)  # as they were
-    (warning,) = fit.result().warnings
+    divisor, warning = fit.result().warnings
+    said, _, used = divisor.rpartition(" ")
+    assert said == f"{SERVO}.gain_divisor stays 256, though the others were found with"
+    assert float(used) == pytest.approx(128.0, rel=0.02)
     assert warning == (
         f"{SERVO}.stall_torque stays 0.7, though the others were found with {true.datasheet[0]:g}"
     )
@@ -63,6 +71,34 @@ def test_servo_of_the_twin_is_found_from_two_recordings(tmp_path: Path) -> None:
     assert [step.step for step in fit.result().steps] == ["gain 300", "gain 500"]
     for step in fit.result().steps:
         assert step.error_deg < 0.2 < step.error_before_deg
+
+
+@pytest.mark.ci
+def test_unloaded_servo_slower_than_its_data_sheet_tells_no_divisor(tmp_path: Path) -> None:
+    """A linear servo with 80 % of the no-load speed and the divisor 128, by SciPy.
+
+    Without a weight and without its drive a fit finds another divisor, that of the sheet's speed.
+    """
+    files, t = [], np.arange(1500) / RATE
+    goal = 0.5 * np.sin(2.0 * np.pi * (0.3 * t + 0.15 * t * t))
+    for gain in (300, 500):
+        own = {"gain_divisor": 128.0, "p_gain": float(gain)}
+        servo = XL330Params().model_copy(update=own)
+        plant = ([servo.stiffness], [servo.armature, servo.damping / 0.8, servo.stiffness])
+        position = signal.lsim(plant, goal, t)[1]
+        rows = np.stack([t, position, goal], axis=1).tolist()
+        names = ("timestamp", "position", "goal_position")
+        more = {"input_volts": 5.0, "torque_enable": True}
+        entries = [dict(zip(names, row, strict=True)) | more for row in rows]
+        files.append(written(tmp_path / f"{gain}.json", entries, gain))
+    for model in found_of(*files, servo="xl330_m288", fit=True).models:
+        assert "gain_divisor" not in model.interval_95
+    fit, robot = fitted(tmp_path / "out", *files)
+    row = next(row for row in fit.rows if row.name == f"{SERVO}.gain_divisor")
+    assert not row.told
+    assert row.low < 128.0 < row.high
+    assert robot.servos.xl330_m288.gain_divisor == row.before
+    assert any("gain_divisor stays 256" in each for each in fit.result().warnings)
 
 
 @pytest.mark.ci
@@ -91,6 +127,11 @@ def test_command_that_is_printed_names_the_file_that_was_written(
         (("no.json", "a.json"), ("--servo", "xl330_m288"), "no.json: expected a readable file"),
         (("a.json", "b.json"), ("--seed", "3"), "seed: expected the default, as recordings do not"),
         (("a.json", "b.json"), ("--leave-out", "yaw1"), "leave_out: expected the default"),
+        (
+            ("a.json", "b.json"),
+            ("--servo", "xl330_m288", "--poses", "take.csv"),
+            "poses: expected the default, as recordings do not read it",
+        ),
         (("a.json", "log.mcap"), (), "expected logs or recordings of a servo, found both, as"),
         (
             ("log.mcap",),

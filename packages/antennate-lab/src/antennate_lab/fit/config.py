@@ -5,12 +5,20 @@ from __future__ import annotations
 import tomllib
 from importlib.resources import files
 from pathlib import Path
+from typing import Literal
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from antennate.errors import ConfigError, in_one_line
 from antennate.files import decoded, read_limited
-from antennate.params.base import LARGEST_FILE, Params, from_values, number, with_bases
+from antennate.params.base import (
+    LARGEST_FILE,
+    Params,
+    from_values,
+    number,
+    require_default,
+    with_bases,
+)
 from antennate.robots.servos import ServoName
 from antennate.robots.spec import ROBOTS, RobotSpec
 
@@ -37,6 +45,24 @@ class FitConfig(Params):
         None, "1", "assumed: has to be named with recordings", metavar="MODEL"
     )
     """Model of the servo that was recorded; logs name theirs."""
+    poses: tuple[str, ...] = number((), "1", "assumed: most have no motion capture", metavar="FILE")
+    """Tables of motion capture, CSV or TRC, one for each log in their order: speed and turn of
+    walks count too."""
+    markers: tuple[str, ...] = number(
+        (),
+        "1",
+        "assumed: those whose names begin with head",
+        metavar="NAME",
+    )
+    """Their markers at the rear of the head and in front, or one body."""
+    unit: float | None = number(None, "m", "assumed: as the tables say, else 1", gt=0, le=1000)
+    """Their unit of length, else as they say."""
+    up: Literal["x", "y", "z"] | None = number(
+        None, "1", "assumed: along which the head hardly moves"
+    )
+    """Their axis that points up, else found."""
+    mirrored: bool = number(False, "1", "assumed: right-handed")
+    """They are left-handed, or have y down as images."""
     leave_out: tuple[str, ...] = number(
         (), "1", "assumed: the walks at the middle one of the frequencies", metavar="STEP"
     )
@@ -47,6 +73,12 @@ class FitConfig(Params):
     """Robots of each of two rounds that walk in the simulation."""
     seed: int = number(0, "1", "assumed: any", ge=0)
     """Seed of draws."""
+
+    @model_validator(mode="after")
+    def _agree(self) -> FitConfig:
+        if not self.poses:
+            require_default(self, "there are no poses", "markers", "unit", "up", "mirrored")
+        return self
 
     @property
     def described(self) -> RobotSpec:

@@ -50,7 +50,7 @@ def _untold(result: FitResult) -> Table:
 def _steps(result: FitResult) -> Table:
     """Steps that the fit did not see; all of them where it saw all."""
     held = [step for step in result.steps if not step.fitted] or result.steps
-    names = (*_STEP_COLUMNS, "turn_after_deg")
+    names = (*_STEP_COLUMNS, "turn_after_deg", "speed_mm", "speed_before_mm", "speed_after_mm")
     held_by = [name for name in names if any(getattr(step, name) is not None for step in held)]
     shown: list[Column] = [column_of(StepRow, name) for name in held_by]
     rows = [(f"{step.log} {step.step}", [each.cell(step) for each in shown]) for step in held]

@@ -6,6 +6,7 @@ is taken between two ticks.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -14,6 +15,7 @@ import numpy as np
 from antennate.errors import BadInputError
 from antennate.params.scene import HookParams
 from antennate.robots.spec import RobotSpec
+from antennate.telemetry.mocap import Poses
 from antennate.telemetry.reader import LogReader
 from antennate.telemetry.steps import LoggedStep, protocol_of, steps
 from antennate.telemetry.ticks import Tick
@@ -61,15 +63,17 @@ class Recording:
     warnings: list[str]
 
 
-def read(path: Path, robot: RobotSpec) -> Recording:
+def read(path: Path, robot: RobotSpec, seen: tuple[str, Poses] | None = None) -> Recording:
     """Read a log.
 
     Args:
         path: Its first file.
         robot: The robot that it is taken for.
+        seen: Name of a table of motion capture beside it, and its poses.
 
     Raises:
-        BadInputError: It is a log of another robot, or of no protocol, or holds no whole step.
+        BadInputError: It is a log of another robot, or of no protocol, or holds no whole step, or
+            the table has no whole cycle of a walk in it.
     """
     with LogReader(path) as log:
         logged = log.header.robot
@@ -87,7 +91,7 @@ def read(path: Path, robot: RobotSpec) -> Recording:
             left_out[step.name] = "what a hand did is not in the log"
             continue
         own = [ticks[n] for n in range(step.begin, step.end) if n in ticks]
-        course, why = _course(step, own, robot, period, protocol.hook)
+        course, why = _course(step, own, robot, period, protocol.hook, seen and seen[1])
         if course is None:
             left_out[step.name] = why
         else:
@@ -105,6 +109,7 @@ def read(path: Path, robot: RobotSpec) -> Recording:
         for name in _SIZES
         if (theirs := getattr(logged, name)) != (ours := getattr(robot, name))
     ]
+    warnings += _unseen(path, *seen, courses) if seen else []
     if missing:
         warnings.append(
             f"{len(missing)} of {len(planned)} steps of the protocol are missing, from "
@@ -113,6 +118,20 @@ def read(path: Path, robot: RobotSpec) -> Recording:
     zero = _gyro_zero(courses)
     courses = [replace(course, gyro=course.gyro - zero) for course in courses]
     return Recording(path.stem, log_hash(path), courses, zero, left_out, warnings)
+
+
+def _unseen(path: Path, table: str, poses: Poses, courses: list[Course]) -> list[str]:
+    """What is unusual about a table, and cycles with gaps in it; refused if there are no others."""
+    rows = [row for course in courses for row in measures.strides(course)[:, 0].tolist()]
+    gaps = sum(map(math.isnan, rows))
+    if gaps == len(rows):
+        raise BadInputError(
+            f"{table}: expected poses over a cycle of a walk on the floor of {path}, found none"
+            f"{f' in {gaps} cycles' if gaps else ', as the log has no walk'}"
+        )
+    told = [f"{table}: {text}" for text in poses.warnings()]
+    named = f"{table}: {gaps} of {len(rows)} cycles of walks have a gap, and are left out"
+    return told + [named] * bool(gaps)
 
 
 def _odd_joints(robot: RobotSpec, courses: list[Course]) -> list[str]:
@@ -128,7 +147,7 @@ def _odd_joints(robot: RobotSpec, courses: list[Course]) -> list[str]:
             f"{name} follows {1e3 * lag:.0f} ms late, other {group} {1e3 * usual:.0f} ms: a servo "
             "of another model, or a damaged one?"
             for name, lag in own.items()
-            if max(lag, usual) > ODD * min(lag, usual) + _MUCH
+            if abs(lag - usual) > (ODD - 1.0) * abs(min(lag, usual)) + _MUCH
         ]
     return told
 
@@ -167,7 +186,12 @@ def _shown(value: object, other: object) -> str:
 
 
 def _course(
-    step: LoggedStep, ticks: list[Tick], robot: RobotSpec, period: float, hook: HookParams
+    step: LoggedStep,
+    ticks: list[Tick],
+    robot: RobotSpec,
+    period: float,
+    hook: HookParams,
+    poses: Poses | None,
 ) -> tuple[Course | None, str]:
     """A step on the grid of the control period, or why there is none."""
     if len(ticks) < FEWEST:
@@ -194,6 +218,7 @@ def _course(
             positions=_between(grid, now, positions),
             gyro=_between(grid, now, felt[0].reshape(len(ticks), -1)),
             counts=_between(grid, now, felt[1])[:, : robot.antenna_count],
+            poses=poses.at(grid) if poses and walks else None,
         ),
         "",
     )

@@ -20,6 +20,7 @@ from antennate.robots.spec import RobotSpec
 from antennate.studies.pool import Workers, gather
 from antennate.studies.trials import OnStep
 from antennate.types import Floats
+from antennate_lab.fit import measures
 from antennate_lab.fit.parameters import Parameter, bounds
 from antennate_lab.fit.residuals import NOISE, moving
 from antennate_lab.fit.simulated import Course, simulated
@@ -32,6 +33,12 @@ WIDER = 2.0
 POSTURE = POSITION_UNIT
 """Standard deviation of what the posture at the beginning of a walk is off [rad] (assumed: a
 position unit of the servos)."""
+LEAST = np.array([0.004, 0.05])
+"""Speed [m/cycle] and turn [rad/cycle] of cycles that differ by less are alike (assumed)."""
+ARM = 0.01
+"""Standard deviation of what the middle of the markers is off that of the head [m] (assumed)."""
+SHARE = 0.1
+"""What speed and turn by motion capture count, over all else that is felt in a walk."""
 _FARTHEST = 3.5
 """A parameter is not told if the regression goes farther from what was known before [standard
 deviations]: no robot that was drawn felt the like."""
@@ -63,33 +70,64 @@ class Known:
         return self.mean + own + self.shared * rng.standard_normal((count, 1))
 
 
-def felt(robot: RobotSpec, course: Course) -> Floats:
+def scatter(courses: Sequence[Course]) -> Floats:
+    """Standard deviation of speed [m/cycle] and turn [rad/cycle] between cycles, shape (2,).
+
+    The first cycle of a walk differs, as it begins with a robot that stands.
+    """
+    later = [measures.strides(course)[1:] for course in courses]
+    known = [rows[np.isfinite(rows[:, 0])] for rows in later]
+    spread = [rows.var(axis=0, ddof=1) for rows in known if len(rows) > 1]
+    return np.maximum(np.sqrt(np.mean(spread, axis=0)), LEAST) if spread else LEAST
+
+
+def felt(course: Course, unit: Floats = LEAST) -> Floats:
     """Means over parts of a cycle of how far joints lag and of the head's turning, shape (F,).
 
-    The first half of a cycle is left out: how the robot came to stand is not known.
+    The first half of a cycle is left out: how the robot came to stand is not known. Speed and turn
+    of each cycle that motion capture has seen stand beside them, so often that they count `SHARE`.
+
+    Args:
+        course: A walk.
+        unit: Scatter of speed and turn between cycles, shape (2,).
     """
     lag = (course.positions - course.commands)[:, moving(course)]
     values = np.concatenate([lag / NOISE["position"], course.gyro / NOISE["gyro"]], axis=1)
     width = max(1, round(course.cycle / course.period / BINS))
     values = values[BINS // 2 * width :]
     count = len(values) // width
-    return np.nan_to_num(values[: count * width].reshape(count, width, -1).mean(axis=1).ravel())
+    own = np.nan_to_num(values[: count * width].reshape(count, width, -1).mean(axis=1).ravel())
+    seen = measures.strides(course) / unit
+    seen = seen[np.isfinite(seen)]
+    return np.concatenate([own, *[seen] * max(1, round(SHARE * len(own) / max(len(seen), 1)))])
 
 
-def _felt_of(robot: RobotSpec, courses: Sequence[Course], seed: int) -> Floats:
+def _felt_of(robot: RobotSpec, courses: Sequence[Course], unit: Floats, seed: int) -> Floats:
     """What a simulated robot feels in all courses; NaN where the simulation fails.
 
-    Each walk begins a little off the posture that was measured, so that chance counts as noise.
+    Each walk begins a little off the posture that was measured, and the markers sit a little off
+    the middle of the head, so that chance counts as noise.
     """
     rng, parts = np.random.default_rng(seed), []
+    arm = ARM * np.random.default_rng([seed, 1]).standard_normal(2)
     for course in courses:
         off = POSTURE * rng.standard_normal(course.positions.shape[1])
         begin = replace(course, positions=course.positions + off)
         try:
-            parts.append(felt(robot, simulated(robot, begin)))
+            parts.append(felt(_marked(simulated(robot, begin), arm), unit))
         except SimulationError:
-            parts.append(np.full_like(felt(robot, course), np.nan))
+            parts.append(np.full_like(felt(course, unit), np.nan))
     return np.concatenate(parts)
+
+
+def _marked(course: Course, arm: Floats) -> Course:
+    """A simulated course with markers ahead of the head's middle and left of it by so much [m]."""
+    if course.poses is None:
+        return course
+    x, y, heading = course.poses.T
+    c, s = np.cos(heading), np.sin(heading)
+    places = [x + arm[0] * c - arm[1] * s, y + arm[0] * s + arm[1] * c, heading]
+    return replace(course, poses=np.stack(places, axis=1))
 
 
 @dataclass(frozen=True)
@@ -182,11 +220,12 @@ def search(
         rng: What they are drawn with.
         on_step: Told of each robot, of both rounds.
     """
-    measured = np.concatenate([felt(made(prior.mean), course) for course in courses])
+    unit = scatter(courses)
+    measured = np.concatenate([felt(course, unit) for course in courses])
     proposal, told = prior, Told(prior.mean, prior.sd, np.eye(len(prior.mean)))
     for number in range(2):
         places = np.clip(proposal.draw(count, rng), *bounds(chosen))
-        tasks = [(made(place), courses, seed) for seed, place in enumerate(places)]
+        tasks = [(made(place), courses, unit, seed) for seed, place in enumerate(places)]
         features = gather(
             _felt_of,
             tasks,

@@ -56,6 +56,12 @@ class StepRow:
     """Likewise, the robot before."""
     turn_after_deg: float | None = column("after", "deg/cycle", form=".1f", default=None)
     """Likewise, the fitted robot."""
+    speed_mm: float | None = column("speed", "mm/cycle", form=".0f", default=None)
+    """Speed of the head in a cycle of the gait by motion capture; `null` without."""
+    speed_before_mm: float | None = column("before", "mm/cycle", form=".0f", default=None)
+    """Likewise, the robot before."""
+    speed_after_mm: float | None = column("after", "mm/cycle", form=".0f", default=None)
+    """Likewise, the fitted robot."""
 
 
 @tabular

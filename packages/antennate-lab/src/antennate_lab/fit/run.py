@@ -15,6 +15,7 @@ from antennate.robots.spec import RobotSpec
 from antennate.studies.pool import Workers, gather, workers_from
 from antennate.studies.run_files import log_of
 from antennate.studies.trials import OnStep, no_step
+from antennate.telemetry.mocap import Poses, poses_of
 from antennate.types import Floats
 from antennate_lab.fit import least_squares, measures, recording, regression
 from antennate_lab.fit.config import FitConfig
@@ -97,6 +98,8 @@ class FitOutcome:
             lag = [1e3 * float(measures.lags(each).mean()) for each in three]
             turns = [math.degrees(measures.turn(each)) for each in three]
             turned = [None if math.isnan(each) else each for each in turns]
+            speeds = [1e3 * measures.speed(each, course) for each in three]
+            gone = [None if math.isnan(each) else each for each in speeds]
             rows.append(
                 StepRow(
                     log=log,
@@ -110,6 +113,9 @@ class FitOutcome:
                     turn_deg=turned[0],
                     turn_before_deg=turned[1],
                     turn_after_deg=turned[2],
+                    speed_mm=gone[0],
+                    speed_before_mm=gone[1],
+                    speed_after_mm=gone[2],
                 )
             )
         return rows
@@ -130,15 +136,17 @@ def run(config: FitConfig, workers: int | Workers, on_step: OnStep = no_step) ->
         raise BadInputError("log: expected logs of `drive --protocol`, found none")
     robot = config.described
     cure = f"`{typed('drive')} --protocol identify` records one"
-    recordings = [recording.read(log_of(Path(name), cure), robot) for name in config.log]
+    paths = [log_of(Path(name), cure) for name in config.log]
+    seen = _seen(config, paths)
+    recordings = [recording.read(path, robot, own) for path, own in zip(paths, seen, strict=True)]
     courses = [(each.name, course) for each in recordings for course in each.courses]
     held = _left_out(config, [course for _, course in courses])
-    seen = [course for _, course in courses if course.name not in held]
+    fitted = [course for _, course in courses if course.name not in held]
     rng = np.random.default_rng(config.seed)
     with workers_from(workers).stay() as pool:
-        air = merged(robot, [course for course in seen if course.hanging])
+        air = merged(robot, [course for course in fitted if course.hanging])
         found = _in_air(robot, air, pool, rng, on_step) if air else []
-        walks = [course for course in seen if is_walk(course)]
+        walks = [course for course in fitted if is_walk(course)]
         if walks:
             found += _on_floor(config, with_told(robot, found), walks, pool, rng, on_step)
         after = with_told(robot, found)
@@ -148,6 +156,19 @@ def run(config: FitConfig, workers: int | Workers, on_step: OnStep = no_step) ->
     warnings = [f"{each.name}: {text}" for each in recordings for text in each.warnings]
     on_step(_ALL, _ALL)
     return FitOutcome(config, after, recordings, courses, held, pairs, found, warnings)
+
+
+def _seen(config: FitConfig, paths: Sequence[Path]) -> list[tuple[str, Poses] | None]:
+    """Motion capture beside each log: name of its table, and its poses in the time of the log."""
+    how = (config.markers, config.unit, config.up, config.mirrored)
+    if not config.poses:
+        return [None] * len(paths)
+    if len(config.poses) != len(paths):
+        raise BadInputError(
+            f"poses: expected a table for each log, {len(paths)}, found {len(config.poses)}"
+        )
+    pairs = zip(paths, config.poses, strict=True)
+    return [(Path(name).name, poses_of(path, Path(name), *how)) for path, name in pairs]
 
 
 def with_told(robot: RobotSpec, found: Sequence[Estimate]) -> RobotSpec:

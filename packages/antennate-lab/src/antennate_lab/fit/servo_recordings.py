@@ -33,6 +33,8 @@ from antennate_lab.servo.experiment import stalls
 from antennate_lab.servo.recording import Recording, ServoConfig
 from antennate_lab.servo.result import ModelSummary
 
+_OF_LOGS = ("poses", "markers", "unit", "up", "mirrored", "leave_out", "robots", "seed")
+"""Settings that recordings of a servo do not read."""
 _RECORD = "lift a known weight with this servo on a bench, at several gains"
 
 
@@ -68,9 +70,7 @@ def are_given(config: FitConfig) -> bool:
             f"log: expected logs or recordings of a servo, found both, as {texts[0]}; fit one, "
             "then the other with --robot FOLDER/robot.toml of the first"
         )
-    what, others = (
-        ("recordings", ("leave_out", "robots", "seed")) if texts else ("logs", ("servo",))
-    )
+    what, others = ("recordings", _OF_LOGS) if texts else ("logs", ("servo",))
     for name, _ in changes(config, others):
         raise BadInputError(
             f"{name}: expected the default, as {what} do not read it, found another"

@@ -43,6 +43,8 @@ class Course:
         positions: Measured angles of all joints [rad], shape (n, J).
         gyro: Angular velocity of the head [rad/s], shape (n, 3), or (n, 0) without a sensor.
         counts: Readings of the antennae [counts], shape (n, 2), or (n, 0) without antennae.
+        poses: Place x, y [m] and heading [rad] of the head by motion capture, shape (n, 3), NaN in
+            gaps; None without.
     """
 
     name: str
@@ -53,6 +55,7 @@ class Course:
     positions: Floats
     gyro: Floats
     counts: Floats
+    poses: Floats | None = None
 
     @property
     def hanging(self) -> bool:
@@ -78,11 +81,13 @@ def simulated(
     sim = SimRobot(1, robot, course.period, PHYSICS.timestep)
     sim.load(0, world, Disturbance(np.random.default_rng(0), _CALM, robot, course.period))
     before = round(SETTLING / course.period)
+    places: list[tuple[float, float, float]] = []
     felt, rows = [], np.concatenate([course.commands[:1]] * before + [course.commands])
     for tick, command in enumerate(commands(robot, rows)):
         felt.append(sim.read())
         if tick >= before:
             look(world)
+            places.append((*world.head[:2].tolist(), world.heading))
         else:
             world.data.qvel *= CALMING
         sim.write(command)
@@ -95,7 +100,14 @@ def simulated(
         positions=np.concatenate([frame.positions for frame in frames]),
         gyro=np.concatenate([frame.angular_velocity for frame in frames]).reshape(len(frames), -1),
         counts=np.concatenate([frame.counts for frame in frames])[:, : robot.antenna_count],
+        poses=None if course.poses is None else _seen(np.array(places), course.poses),
     )
+
+
+def _seen(places: Floats, measured: Floats) -> Floats:
+    """Poses of a simulation where motion capture has some, shape (n, 3)."""
+    whole = np.column_stack([places[:, :2], np.unwrap(places[:, 2])])
+    return np.where(np.isfinite(measured), whole, np.nan)
 
 
 def _silent(robot: RobotSpec) -> RobotSpec:

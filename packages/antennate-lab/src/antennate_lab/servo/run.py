@@ -166,6 +166,9 @@ def run(config: ServoConfig, on_step: OnStep = no_step) -> ServoOutcome:
         on_step(len(seen), total)
         last = slice(-_JUDGED, None)
         interval[last] = _intervals(recordings, data, fits[0][last], rows[last])
+        if not loaded and fitting.measured_divisor(recordings) is None:
+            # only its ratio to the no-load speed shows
+            interval[:, :, MODEL_NUMBERS.index("gain_divisor")] = np.nan
     on_step(total, total)
     judged = [
         fitting.errors(data, fits[i], _same(out, len(rows)))
