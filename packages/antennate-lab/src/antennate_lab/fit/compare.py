@@ -28,8 +28,8 @@ from antennate_lab.fit.simulated import Course
 
 ALIKE = {"lag": 5.0, "gain": 0.15, "friction": 0.02, "backlash": 0.3}
 """Margins on both sides of the interval of the file [ms], [share of the fitted gain], [N·m], [deg]
-(assumed; false alarms and misses were not counted). The lag is the time from a goal to the drive
-that follows it."""
+(assumed; misses were not counted, false alarms in docs/fit.md). The lag is the time from a goal to
+the drive that follows it."""
 _UNITS = {"lag": " ms", "gain": "", "friction": " N·m", "backlash": "°"}
 _CAUSES = {
     "lag": "return delay, Profile Velocity and load",
