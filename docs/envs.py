@@ -92,7 +92,8 @@ The ids, with their scenes: {ids}.
 - **Autoreset** of a vector: `autoreset_mode="NEXT_STEP"` (the default), `"SAME_STEP"` (with
   `final_obs` and `final_info`) or `"DISABLED"` (with `reset(options={{"reset_mask": rows}})`).
 - **`info`** holds what only the simulation knows, and no observation: `head` (x, y [m], heading
-  [rad]), `progress` and `length` [m], `force` [N], `t` [s], `maneuver`, `seed`, `episode_number`,
+  [rad]), `progress` and `length` [m], `side` (of the route 0.6 m ahead, as of `--knows side`: +1
+  left, -1 right, 0 straight ahead), `force` [N], `t` [s], `maneuver`, `seed`, `episode_number`,
   the terms of the reward, and at the end `outcome` and `reason`.
 
 Stable-Baselines3 takes the single environment, `PPO("MlpPolicy", env)`; skrl takes the vector,
@@ -280,6 +281,10 @@ uv run --no-sync antennate tunnel --scene uturn --trials 100 --seed 67957488 \\
 uv run python docs/science/learned.py  # all tables, of the rows beside it
 ```
 
+- **Other students**: `--robot FILE` teaches one with other antennae, `--frequency 0.8` one at the
+  fastest pace that today's legs keep. With `--teacher-knows side` its teacher is told the side on
+  which the way goes on, and the student learns to say it, from its own senses. No such student has
+  been judged yet.
 - **What it lacks**: 22 of its 24 failures turn round and leave by the entrance. So do 17 of the 18
   of its teacher, `geometric` at 1 Hz.
 - **Where it had not learned**, at the corner of 120° and in the dead end, it beats `closed` and

@@ -88,7 +88,7 @@ def test_numbers_of_a_joint_alone_are_those_of_a_formula(tmp_path: Path) -> None
 
 @pytest.mark.parametrize("amplitude", [0.5, 0.1])
 def test_interval_is_not_shorter_than_what_no_noise_shows(tmp_path: Path, amplitude: float) -> None:
-    """1.645 / √3 of: a timestep of 2 ms, half of 2π/4096 rad times 6.85 N·m/rad, 1 % and rounding.
+    """1.645 / √3 of: a timestep of 2 ms, half of 2π/4096 rad times 6.85 N·m/rad, 0.5 % and rounding.
 
     The stiffness is that of the servo as it is shipped, 1.7 N·m times its gain.
     """
@@ -109,7 +109,7 @@ def test_interval_is_not_shorter_than_what_no_noise_shows(tmp_path: Path, amplit
     assert delay == pytest.approx(share * 0.002, rel=1e-6)
     assert friction == pytest.approx(share * unit * 6.848, rel=1e-3)
     ratio = math.log(found[2].interval[1] / found[2].interval[0]) / 2
-    assert ratio == pytest.approx(share * math.hypot(0.01, unit / swing), rel=1e-3)
+    assert ratio == pytest.approx(share * math.hypot(0.005, unit / swing), rel=1e-3)
 
 
 def test_lag_is_the_shift_of_a_sine() -> None:
