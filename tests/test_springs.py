@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import math
+import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,7 +14,7 @@ from antennate.antenna import springs
 from antennate.antenna.load import SpringLoad, largest_load
 from antennate.errors import ConfigError
 from antennate.experiments.antenna.config import AntennaConfig
-from antennate.experiments.antenna.experiment import run, tables
+from antennate.experiments.antenna.experiment import run, sentence, tables
 from antennate.experiments.antenna.physics import springs_of, taper_of
 from antennate.experiments.antenna.result import AntennaResult
 from antennate.params.spring import SpringParams, TaperParams
@@ -97,6 +99,23 @@ def test_wound_sets_keep_all_limits_and_their_own_law() -> None:
 def test_a_mandrel_is_smaller_than_its_coil_by_the_wire() -> None:
     wound = springs_of(AntennaConfig()).windings[0]
     assert wound.coil_mm - wound.mandrel_mm == pytest.approx(wound.wire_mm)
+
+
+def test_the_sentence_names_the_wire_of_which_its_sizes_keep_to_the_law() -> None:
+    """E d^4 / (3888 D N) in N·mm/deg, N in quarter turns; E of stainless and music wire."""
+    result = run(AntennaConfig()).result()
+    for wire, modulus in (("stainless_302", 193e3), ("music_wire", 203e3)):
+        told = sentence(replace(result, springs=springs_of(AntennaConfig(wire=wire))))
+        sizes = r"Of ([\w ]+), stock wire of ([\d.]+) mm .* of ([\d.]+) mm .* within ([\d.]+) %"
+        found = re.match(sizes, told)
+        assert found is not None, told
+        assert found[1] == wire.replace("_", " ")
+        d, mandrel, percent = (float(found[n]) for n in (2, 3, 4))
+        one = modulus * d**4 / (3888 * (mandrel + d))
+        worst = max(abs(one / (round(4 * one / k) / 4) / k - 1) for k in (0.274, 0.137, 0.091))
+        assert 100 * worst == pytest.approx(percent, abs=0.06)
+    none = springs_of(AntennaConfig(wanted_n_mm_per_deg=(90.0,)))
+    assert sentence(replace(result, springs=none)).startswith("No stock wire of stainless 302 ")
 
 
 def test_the_tables_of_a_result_that_was_read_are_those_of_the_run() -> None:

@@ -125,7 +125,8 @@ def _of_springs(found: Springs) -> tuple[Table, Table]:
     wound = Table.of(
         "Sets to wind",
         {f"{each.wire_mm:.2f} mm": each for each in found.windings[:_SETS]},
-        note="The best mandrel of each stock wire, nearest first. For printed parts wind the "
+        note=f"The best mandrel of each stock wire of {found.wire}, nearest first. For printed "
+        "parts wind the "
         "springs of `antennate build` instead: its pins and stops are made for them."
         if found.windings
         else "",
@@ -182,12 +183,13 @@ def sentence(result: AntennaResult) -> str:
     """How near the springs come to what is wanted, what the sensor reads, and how it recovers."""
     springs, sensor, swing = result.springs, result.sensor, result.ringdown.engine
     wanted = f"{', '.join(f'{k:g}' for k in springs.wanted_n_mm_per_deg)} N·mm/deg"
-    nearest = f"No stock wire gives {wanted} within the limits"
+    nearest = f"No stock wire of {springs.wire} gives {wanted} within the limits"
     if springs.windings:
         best = springs.windings[0]
         nearest = (
-            f"Wire of {best.wire_mm:.2f} mm on a mandrel of {best.mandrel_mm:.1f} mm comes within "
-            f"{100 * best.largest_error:.1f} % of {wanted}"
+            f"Of {springs.wire}, stock wire of {best.wire_mm:.2f} mm on a mandrel of "
+            f"{best.mandrel_mm:.1f} mm comes nearest, within {100 * best.largest_error:.1f} % of "
+            f"{wanted} (for printed parts `antennate build` chooses)"
         )
     used, best_ohm = 1e-3 * sensor.divider_ohm, 1e-3 * sensor.best_divider_ohm
     return (

@@ -90,6 +90,7 @@ def springs_of(config: AntennaConfig) -> Springs:
         )
     wanted = tuple(k * N_MM_PER_DEG for k in config.wanted_n_mm_per_deg)
     return Springs(
+        wire=config.wire.replace("_", " "),
         spring_index=(1e-3 * config.coil_mm) / (1e-3 * wire),
         coil_outer_mm=config.coil_mm + wire,
         hinge_distance_mm=1e3 * config.antenna.link_length,

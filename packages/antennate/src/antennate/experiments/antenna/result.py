@@ -55,6 +55,8 @@ class WoundSet:
 class Springs:
     """Springs as they are, and as they could be wound."""
 
+    wire: str
+    """Kind of wire."""
     spring_index: float
     """Mean diameter of the coils over that of the wire."""
     coil_outer_mm: float
