@@ -5,7 +5,9 @@ from __future__ import annotations
 import csv
 import json
 import math
+import re
 import time
+from collections import Counter
 from pathlib import Path
 
 import numpy as np
@@ -22,9 +24,20 @@ from antennate.robots.spec import RobotSpec
 from antennate.sim.engine import mujoco
 from antennate.sim.world import World, compile_world
 from antennate.testing import check_robot
-from antennate_build import antenna_checks, checks, fasteners, kernel, mounts, voxels, weights
+from antennate_build import (
+    antenna_checks,
+    checks,
+    fasteners,
+    kernel,
+    link_parts,
+    mounts,
+    voxels,
+    weights,
+)
 from antennate_build.antenna_assembly import AntennaSolids
 from antennate_build.build import comparing
+from antennate_build.build.config import BuildConfig
+from antennate_build.build.naming import links_of
 from antennate_build.layout import layout_of
 from antennate_build.mounts import X330
 from antennate_build.printing import PrintParams
@@ -80,6 +93,21 @@ def test_segments_meet_beyond_their_stop_and_not_before(pair: tuple[str, str], s
         assert common(sign * (stop + 10.0)) > 1.0
 
 
+def as_billed(out: Path) -> Counter[str]:
+    """Parts of the assembly's STEP file, which are those of the bill, as many and by its names."""
+    text = (out / "step/assembly.step").read_text().replace("\n", "")
+    used = re.findall(r"NEXT_ASSEMBLY_USAGE_OCCURRENCE\('\w+',\s*'([^']+)'", text)
+    found = Counter(name for name in used if name != "body")  # a spring has three
+    rows = list(csv.DictReader((out / "bom.csv").read_text().splitlines()))
+    billed = Counter[str]()
+    for row in rows:
+        billed[row["item"]] += int(row["count"])
+    printed = {row["item"] for row in rows if row["use"] == "printed"}
+    assert printed <= found.keys()
+    assert {name: billed[name] for name in found} == found
+    return found
+
+
 def test_an_antenna_of_stainless_wire_weighs_within_a_tenth_of_the_simulated_one(
     tmp_path: Path,
 ) -> None:
@@ -106,8 +134,50 @@ def test_an_antenna_of_stainless_wire_weighs_within_a_tenth_of_the_simulated_one
         assert (out / "figures" / f"{name}.svg").is_file()
     rows = list(csv.DictReader((out / "bom.csv").read_text().splitlines()))
     assert {row["cost"] for row in rows} == {""}
-    springs = {row["item"]: int(row["count"]) for row in rows if "turns" in row["item"]}
-    assert list(springs.values()) == [1, 2, 3]
+    parts = as_billed(out)
+    assert [parts[f"torsion spring of {n} turns"] for n in (3, 6, 9)] == [1, 2, 3]
+    assert (parts["segment_4"], parts["pin"], parts["cover"]) == (2, 6, 6)
+
+
+def test_the_default_robot_passes_every_check_and_its_assembly_is_that_of_its_bill(
+    tmp_path: Path,
+) -> None:
+    out = tmp_path / "out"
+    assert main(["build", "scuttle", "--out", str(out), "--no-figures"]) == 0
+    result = json.loads((out / "result.json").read_text())
+    assert [check for check in result["checks"] if not check["good"] or check["warn"]] == []
+    assert {part["wall_mm"] for part in result["parts"].values()} == {1.2}
+    parts = as_billed(out)
+    assert (parts["DYNAMIXEL XC430-W240-T"], parts["DYNAMIXEL XL330-M288-T"]) == (17, 2)
+    assert (parts["battery, three lithium cells"], parts["leg"], parts["segment_4"]) == (1, 12, 4)
+
+
+@pytest.mark.parametrize("name", ["cover", "frame"])
+def test_a_wall_of_a_line_and_an_island_are_found_in_a_small_and_in_a_large_part(name: str) -> None:
+    if name == "cover":
+        part, up, top = solids(AntennaSpec()).printed["cover"], antenna_checks.up_of("cover"), "y"
+    else:
+        found = links_of(BuildConfig(robot=RobotSpec()))
+        assert found is not None
+        part, up, top = link_parts.frame(found[0], first=False, last=False), "z", "z"
+    (_, y, z), (_, high_y, high_z) = kernel.bounds(part)
+    fin = (
+        ((-0.2, 0.2), (y, y + 8.0), (-2.0, 2.0))
+        if top == "y"
+        else ((-0.2, 0.2), (-4, 4), (z, z + 12))
+    )
+    at = high_y + 3.0 if top == "y" else high_z + 3.0
+    island = ((-1, 1), (at, at + 2), (-1, 1)) if top == "y" else ((-1, 1), (-1, 1), (at, at + 2))
+    sound, thin, loose = (
+        checks.printed(solid, up, 1.2)
+        for solid in (part, *(kernel.joined(part, kernel.block(*b)) for b in (fin, island)))
+    )
+    assert not checks.walls_check({name: sound}, 1.2).warn
+    assert checks.walls_check({name: thin}, 1.2).warn
+    assert 0.2 < thin.wall < 0.9
+    assert (sound.closed, thin.closed, loose.closed) == (True, True, False)
+    assert checks.layers_check({name: loose}).found.endswith(f"begin in the air: {name}")
+    assert checks.layers_check({name: sound}).found.endswith("none begins in the air")
 
 
 FOUR = "links = 4\nmass = 1.4\n"

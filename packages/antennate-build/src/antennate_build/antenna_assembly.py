@@ -19,13 +19,18 @@ class Placed:
 
     Attributes:
         name: Its name, with a number where there are several.
-        part: The part that it is one of.
+        part: The item of the bill that it is one of.
         solid: The solid, in the frame of the assembly.
     """
 
     name: str
     part: str
     solid: Solid
+
+    @property
+    def kind(self) -> str:
+        """What it is: bracket, spring, pin, segment or cover."""
+        return self.name.partition("_")[0]
 
 
 @dataclass(frozen=True)
@@ -97,7 +102,8 @@ class AntennaSolids:
         for n, name in enumerate(self.names):
             if springs:
                 spring = antenna_parts.spring(self.layout, n, angles[n])
-                parts.append(self._put(f"spring_{n + 1}", "spring", spring, at, heading))
+                item = self.layout.springs[n].item
+                parts.append(self._put(f"spring_{n + 1}", item, spring, at, heading))
             parts.append(self._put(f"pin_{n + 1}", "pin", self.printed["pin"], at, heading))
             heading += angles[n]
             parts.append(self._put(f"segment_{n + 1}", name, self.printed[name], at, heading))

@@ -8,7 +8,15 @@ from __future__ import annotations
 import math
 
 from antennate_build import kernel
-from antennate_build.flange import FLANGE, PIN_HEAD, flange_radius, hinge_height, screw_places
+from antennate_build.flange import (
+    FLANGE,
+    PIN_HEAD,
+    flange_circles,
+    flange_radius,
+    hinge_height,
+    opening_radius,
+    screw_places,
+)
 from antennate_build.kernel import Solid
 from antennate_build.layout import FOOT, AntennaLayout
 from antennate_build.mounts import Mount
@@ -17,6 +25,8 @@ _TIE = 3.0
 """Length of a floor between the plates [mm]."""
 _WINDOW = 9.0
 """Longest window in a plate [mm]: a bridge while it is printed."""
+_HEAD = 0.6
+"""How far the head of a pin reaches over it [mm]."""
 PRESS = 0.05
 """Hole of the outer arms over the pin [mm]: it sits there, and turns in the inner arms."""
 
@@ -107,9 +117,9 @@ def _end_plates(layout: AntennaLayout) -> list[Solid]:
 
 
 def _ties(layout: AntennaLayout, number: int, last: bool) -> list[Solid]:
-    """Floors between the plates, with a beam about the hole of each leg."""
+    """Floors between the plates, with a beam about the hole of each leg, open at its end."""
     hinge, wall = layout.hinge, layout.print.wall_mm
-    length, tied, held = layout.length, hinge.clear + _TIE, layout.springs[0].leg + wall
+    length, tied, held = layout.length, hinge.clear + _TIE, layout.springs[0].leg
     ends = [((0.0, tied), (0.0, held), layout.leg_height(number, upper=True))]
     if not last:
         z = layout.leg_height(number + 1, upper=False)
@@ -226,7 +236,7 @@ def _holes(layout: AntennaLayout, number: int, last: bool) -> list[Solid]:
 def pin(layout: AntennaLayout) -> Solid:
     """A hinge pin with its head at the top and a flat on which it is printed."""
     hinge = layout.hinge
-    radius, head = hinge.pin / 2.0, hinge.lug - 0.3
+    radius, head = hinge.pin / 2.0, hinge.pin / 2.0 + _HEAD
     shaft = kernel.rod(radius, (0, 0, -hinge.half), 2.0 * hinge.half)
     whole = kernel.joined(shaft, kernel.rod(head, (0, 0, hinge.half), PIN_HEAD))
     flat = -0.74 * radius
@@ -258,7 +268,7 @@ def bracket(layout: AntennaLayout, mount: Mount, turn: float = 0.0) -> Solid:
     if math.cos(turn) < 0.0:
         column = kernel.mirrored(column, "y")
     whole = kernel.joined(fork, column, flange)
-    return kernel.cut(whole, *_screw_holes(mount, height, layout.antenna.roll))
+    return kernel.cut(whole, *_flange_holes(layout, mount, height))
 
 
 def _column(layout: AntennaLayout, mount: Mount) -> tuple[float, float]:
@@ -303,22 +313,18 @@ def _fork(layout: AntennaLayout, mount: Mount) -> Solid:
 
 
 def _flange(layout: AntennaLayout, mount: Mount, back: float, height: float) -> Solid:
-    """The plate on the horn, drawn back to the column so that it prints upright without support."""
-    radius, low = flange_radius(layout, mount), -height
-    disc = kernel.rod(radius, (0, 0, low), FLANGE)
-    side = 3.5
-    tangent = math.atan2(side, back) - math.acos(radius / math.hypot(back, side))
-    x, y = radius * math.cos(tangent), radius * math.sin(tangent)
-    outline = [(back, side), (x, y), (x, -y), (back, -side)]
-    return kernel.joined(disc, kernel.prism(outline, (low, low + FLANGE)))
+    """The plate on the horn, about its screws and back to the column: it prints upright so."""
+    edge = [(back, -3.5), (back, 3.5)]
+    return kernel.hull(flange_circles(layout, mount), edge, (-height, FLANGE - height))
 
 
-def _screw_holes(mount: Mount, height: float, roll: float) -> list[Solid]:
+def _flange_holes(layout: AntennaLayout, mount: Mount, height: float) -> list[Solid]:
+    """Holes of the screws and their heads, and the opening about the shaft."""
     screw = mount.horn.screw
     holes = []
-    for x, y in screw_places(mount, roll):
+    for x, y in screw_places(mount, layout.antenna.roll):
         holes.append(kernel.rod(screw.clearance / 2.0, (x, y, -height - 1), FLANGE + 2))
         holes.append(kernel.rod(screw.head / 2.0 + 0.2, (x, y, -height + FLANGE), 50))
-    if mount.horn.centre:
-        holes.append(kernel.rod(mount.horn.centre / 2.0, (0, 0, -height - 1), FLANGE + 2))
+    if opening := opening_radius(layout, mount):
+        holes.append(kernel.rod(opening, (0, 0, -height - 1), FLANGE + 2))
     return holes

@@ -228,10 +228,14 @@ def bracket_sheet(antenna: AntennaSolids) -> Figure:
     end.draw(part, hidden=True)
     oblique = View(axes, (215.0, 158.0), 0.8 * scale, (0.6, -0.65, 0.45), (0.0, 0.0, 1.0))
     oblique.draw(part, colour=PALE["printed"])
-    radius = flange.flange_radius(layout, mount)
+    circles, opening = flange.flange_circles(layout, mount), flange.opening_radius(layout, mount)
+    radius, half = (max(circle[n] + circle[2] for circle in circles) for n in (0, 1))
     (back, _), (front, _) = kernel.bounds(part)[0][:2], (radius, 0)
     above.length((back, radius, 0), (front, radius, 0), (0, 8), f"{front - back:.2f}")
-    above.radius((0, 0, 0), radius, -35, f"R {radius:.2f}")
+    x, y, boss = circles[-1]
+    above.radius((x, y, 0), boss, 35, f"R {boss:.2f}")
+    if opening:
+        above.radius((0, 0, 0), opening, -35, f"Ø {2 * opening:.2f}", 22)
     for n, (x, y) in enumerate(screws[:1]):
         above.radius(
             (x, y, 0),
@@ -262,7 +266,7 @@ def bracket_sheet(antenna: AntennaSolids) -> Figure:
         (0, 7),
         f"{layout.strip.top - layout.low:.2f}",
     )
-    end.length((0, -radius, -height), (0, radius, -height), (0, -7), f"{2 * radius:.2f}")
+    end.length((0, -half, -height), (0, half, -height), (0, -7), f"{2 * half:.2f}")
     return figure
 
 
@@ -282,19 +286,19 @@ def exploded_sheet(antenna: AntennaSolids, steps: tuple[str, ...]) -> Figure:
         if n > shown:
             continue
         own = first + (n - 1) * (layout.length + gap) if n else 0.0
-        x = own - gap / 2.0 if placed.part in ("spring", "pin") else own
-        if placed.part == "spring":
+        x = own - gap / 2.0 if placed.kind in ("spring", "pin") else own
+        if placed.kind == "spring":
             body = layout.springs[n - 1]
             path = sheet.helix(body.coil / 2, body.wire, body.turns, body.leg)
             view.wire(path + np.array([x, 0.0, 0.0]), body.wire, PALE["spring"])
             named.setdefault("spring", view.place((x + body.leg, -body.coil / 2, body.body / 2)))
             continue
-        away = {"pin": (0.0, 18.0), "cover": (16.0, 4.0)}.get(placed.part, (0.0, 0.0))
+        away = {"pin": (0.0, 18.0), "cover": (16.0, 4.0)}.get(placed.kind, (0.0, 0.0))
         by = (x - layout.length * max(n - 1, 0), *away)
         solid = kernel.moved(placed.solid, by)
-        view.draw(solid, colour=PALE.get(placed.part, PALE["printed"]))
+        view.draw(solid, colour=PALE.get(placed.kind, PALE["printed"]))
         middle = np.mean(kernel.bounds(solid), axis=0)
-        named.setdefault(_kind(placed.part), view.place(tuple(middle)))
+        named.setdefault(placed.kind, view.place(tuple(middle)))
     for n, (kind, place) in enumerate(named.items()):
         end = (place[0] + 8.0, place[1] + (-34.0 if kind == "spring" else 38.0))
         letter = "ABCDE"[n]
@@ -313,21 +317,11 @@ def _hinge_of(name: str) -> int:
     return int(number) - (kind == "cover")
 
 
-def _kind(part: str) -> str:
-    return (
-        "segment"
-        if part.startswith("segment")
-        else "bracket"
-        if part.startswith("bracket")
-        else part
-    )
-
-
 def shaded(antenna: AntennaSolids, angles: tuple[float, ...]) -> Figure:
     """The antenna as one sees it, bent a little."""
     parts = antenna.placed(angles)
     view, figure = sheet.picture(7.0, 3.0, OBLIQUE)
-    plain = [(p.solid, PALE.get(p.part, PALE["printed"])) for p in parts if p.part != "spring"]
-    wires = [(p.solid, WIRE) for p in parts if p.part == "spring"]
+    plain = [(p.solid, PALE.get(p.kind, PALE["printed"])) for p in parts if p.kind != "spring"]
+    wires = [(p.solid, WIRE) for p in parts if p.kind == "spring"]
     view.scene(plain, 1.2, wires)
     return figure

@@ -11,7 +11,8 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 
 from antennate.params.spring import SpringParams
-from antennate.robots.parts import bought
+from antennate.robots.parts import bought, servo_item, source_item, supply
+from antennate.robots.servos import ServoName
 from antennate.robots.spec import RobotSpec
 from antennate.studies.formats import to_csv
 from antennate_build.fasteners import Fastener
@@ -55,7 +56,7 @@ def spring_items(layout: AntennaLayout, params: SpringParams, antennae: int) -> 
         items.append(
             Item(
                 antennae * count,
-                f"torsion spring of {spring.turns:g} turns",
+                spring.item,
                 "antenna hinges",
                 spring_words(spring, params),
                 round(spring.mass, 3),
@@ -101,6 +102,26 @@ def printed_items(
         )
         for name, count in counts.items()
     ]
+
+
+def servo_of(robot: RobotSpec, part: str) -> ServoName:
+    """Kind of a servo of the assembly, which is named as `servo leg_left`."""
+    kinds: dict[str, ServoName] = {
+        "leg": robot.legs.servo,
+        "yaw": robot.yaw.servo,
+        "pitch": robot.pitch.servo,
+        "antenna": robot.antennae.servo,
+    }
+    return kinds[part.removeprefix("servo ").partition("_")[0]]
+
+
+def item_of(robot: RobotSpec, part: str) -> str:
+    """Item of the bill that a part of the assembly is."""
+    if part == "battery":
+        return source_item(supply(robot))
+    if part.startswith("servo "):
+        return servo_item(robot.servos.of(servo_of(robot, part)).servo)
+    return part
 
 
 def bought_items(robot: RobotSpec) -> list[Item]:

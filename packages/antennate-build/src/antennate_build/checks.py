@@ -52,7 +52,7 @@ class Print:
     Attributes:
         solid: The solid, upright on the bed at z = 0.
         mesh: Its triangles.
-        closed: Whether they close it.
+        closed: Whether they close it, and it is one body.
         wall: Thinnest wall [mm], no more than what is asked for.
         thin: A place in it, in words; empty where nothing is thinner than asked for.
         overhangs: What needs support.
@@ -93,6 +93,7 @@ def printed(solid: Solid, up: Up, wall: float, tolerance: float = 0.02) -> Print
     put = upright(solid, up)
     mesh = kernel.mesh(put, tolerance)
     whole = trimesh.Trimesh(mesh.points, mesh.triangles)
+    closed = bool(whole.is_watertight and whole.is_winding_consistent and whole.volume > 0)
     size = max(CUBE, float(np.prod(np.ptp(mesh.points, axis=0)) / _MOST_CUBES) ** (1.0 / 3.0))
     cubes = voxels.voxels(mesh, size)
     least, place = voxels.thinnest(cubes, wall)
@@ -100,12 +101,19 @@ def printed(solid: Solid, up: Up, wall: float, tolerance: float = 0.02) -> Print
     return Print(
         put,
         mesh,
-        bool(whole.is_watertight and whole.is_winding_consistent and whole.volume > 0),
+        closed and kernel.count(solid) == 1,
         least,
         where,
         tuple(voxels.overhangs(cubes)),
         voxels.layers(cubes),
     )
+
+
+def walls_check(prints: Mapping[str, Print], asked: float) -> Check:
+    """The check that walls are as thick as is asked for [mm]; a warning where one is not."""
+    thin = [f"{name} {part.wall:.1f} mm" for name, part in prints.items() if part.wall < asked]
+    told = f"thinner than {asked:g} mm: {', '.join(thin)}" if thin else f"{asked:g} mm or more"
+    return Check("walls", told, True, bool(thin))
 
 
 def layers_check(prints: Mapping[str, Print]) -> Check:

@@ -51,8 +51,30 @@ def _lowest(layout: AntennaLayout, turn: float, radius: float) -> float:
 
 def flange_radius(layout: AntennaLayout, mount: Mount) -> float:
     """Radius of the bracket's flange: that of the horn, or more for walls about the screws."""
-    holes = mount.horn.circle / 2.0 + mount.horn.screw.clearance / 2.0 + layout.print.wall_mm
-    return max(mount.horn.diameter / 2.0, holes)
+    return max(mount.horn.diameter / 2.0, mount.horn.circle / 2.0 + _boss(layout, mount))
+
+
+def _boss(layout: AntennaLayout, mount: Mount) -> float:
+    """Radius of a wall about a screw."""
+    return mount.horn.screw.clearance / 2.0 + layout.print.wall_mm
+
+
+def flange_circles(layout: AntennaLayout, mount: Mount) -> list[tuple[float, float, float]]:
+    """Circles (x, y, radius) that the flange goes around: about each screw, to save mass.
+
+    Where the antenna has a roll, the arms above need all of the disc.
+    """
+    roll = layout.antenna.roll
+    if roll:
+        return [(0.0, 0.0, flange_radius(layout, mount))]
+    return [(x, y, _boss(layout, mount)) for x, y in screw_places(mount, roll)]
+
+
+def opening_radius(layout: AntennaLayout, mount: Mount) -> float:
+    """Radius of the opening about the shaft, a wall from screws and column; 0 without one."""
+    saved = mount.horn.circle / 2.0 - _boss(layout, mount)
+    saved = 0.0 if layout.antenna.roll else min(saved, layout.hinge.clear)
+    return max(saved, mount.horn.centre / 2.0)
 
 
 def screw_places(mount: Mount, roll: float = 0.0) -> list[tuple[float, float]]:

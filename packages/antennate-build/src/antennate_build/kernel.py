@@ -6,11 +6,10 @@ join, cut and move solids, measure them, and write them as STEP and STL.
 
 from __future__ import annotations
 
+import io
 import math
-import tempfile
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any, Literal
 
 import build123d  # pyright: ignore[reportMissingImports]
@@ -59,6 +58,18 @@ def prism(
     corners = [after for before, after in ring if math.dist(before, after) > 1e-6]
     face = plane * bd.make_face(bd.Polyline(*corners, close=True))
     return bd.extrude(face, max(along) - min(along), dir=plane.z_dir)
+
+
+def hull(
+    circles: Sequence[tuple[float, float, float]],
+    edge: Sequence[tuple[float, float]],
+    along: Sequence[float],
+) -> Solid:
+    """A prism along z over the convex hull of circles (x, y, radius) and a straight edge."""
+    rims = [bd.Pos(x, y, 0.0) * bd.Circle(radius) for x, y, radius in circles]
+    found = bd.make_hull([e for rim in rims for e in rim.edges()] + [bd.Edge.make_line(*edge)])
+    face = bd.Pos(0.0, 0.0, min(along)) * found
+    return bd.extrude(face, max(along) - min(along), dir=(0.0, 0.0, 1.0))
 
 
 def coil(radius: float, wire: float, turns: float, ends: tuple[float, float]) -> Solid:
@@ -189,20 +200,20 @@ def mesh(solid: Solid, tolerance: float = 0.02, turn: float = 0.2) -> Mesh:
     return Mesh(np.array([tuple(p) for p in points]), np.array(triangles, dtype=np.int64))
 
 
-def step(solids: Mapping[str, Solid]) -> bytes:
-    """A STEP file with named solids."""
+def step(solids: Sequence[tuple[str, Solid]]) -> bytes:
+    """A STEP file with named solids; copies of one, which share its faces, need its name."""
     children = []
-    for name, solid in solids.items():
-        for each in solid.solids():
-            each.label = name
-            children.append(each)
-    with tempfile.TemporaryDirectory() as folder:
-        file = Path(folder, "part.step")
-        whole = (
-            children[0] if len(children) == 1 else bd.Compound(label="antennate", children=children)
-        )
-        bd.export_step(whole, file, timestamp="2020-01-01T00:00:00")
-        return file.read_bytes()
+    for name, solid in solids:
+        bodies = solid.solids()
+        for body in bodies:
+            body.label = "body"
+        child = bodies[0] if len(bodies) == 1 else bd.Compound(children=bodies)
+        child.label = name
+        children.append(child)
+    whole = children[0] if len(children) == 1 else bd.Compound(label="antennate", children=children)
+    file = io.BytesIO()
+    bd.export_step(whole, file, timestamp="2020-01-01T00:00:00")
+    return file.getvalue()
 
 
 def outlines(solid: Solid, eye: Point, up: Point) -> tuple[list[Floats], list[Floats]]:

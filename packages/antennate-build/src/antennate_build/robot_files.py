@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from antennate.files import writing
 from antennate.params.base import from_values, put_over
 from antennate.params.scene import PhysicsParams
 from antennate.robots.spec import ANTENNA_PREFIXES, RobotSpec
@@ -42,8 +43,9 @@ def files(
     meshes = {f"{name}.stl": data for name, data in _meshes(robot, antenna).items()}
     built = from_values(RobotSpec, put_over(spec.model_dump(), {**values, "meshes": MESHES}))
     with tempfile.TemporaryDirectory() as folder:
-        for name, data in meshes.items():
-            Path(folder, name).write_bytes(data)
+        with writing(Path(folder)):
+            for name, data in meshes.items():
+                Path(folder, name).write_bytes(data)
         drawn = built.model_copy(update={"meshes": folder})
         text = to_mjcf(lone_robot(PhysicsParams(), drawn, _PERIOD), "The robot as it is built").text
     named = text.replace('file="robot_', f'file="{MESHES}/')

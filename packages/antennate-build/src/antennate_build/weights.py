@@ -14,6 +14,7 @@ import numpy as np
 
 from antennate.robots.parts import supply
 from antennate_build import kernel
+from antennate_build.billing import servo_of
 from antennate_build.fasteners import Fastener
 from antennate_build.kernel import Solid
 from antennate_build.link_layout import CABIN, PLATE
@@ -69,14 +70,12 @@ def _carried(robot: RobotSolids, screws: Sequence[Fastener], link: int) -> list[
 def link_weights(robot: RobotSolids, screws: Sequence[Fastener], number: int) -> list[Weight]:
     """All of a link without its legs and antennae, in its frame."""
     spec, density = robot.layout.robot, robot.layout.print.density
-    servos = {"leg": spec.legs.servo, "yaw": spec.yaw.servo}
-    servos |= {"pitch": spec.pitch.servo, "antenna": spec.antennae.servo}
     found: list[Weight] = []
     for name, solid in robot.bodies(number):
         if name == "battery":
             found.append((name, BATTERY * supply(spec).least_capacity, solid))
         elif name.startswith("servo "):
-            servo = servos[name.removeprefix("servo ").partition("_")[0]]
+            servo = servo_of(spec, name)
             found.append((servo, GRAMS[servo], solid))
         else:
             found.append((name, density * kernel.volume(solid), solid))

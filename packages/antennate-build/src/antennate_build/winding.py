@@ -83,6 +83,11 @@ class Spring:
     stop: float
 
     @property
+    def item(self) -> str:
+        """Its name in the bill and in the assembly."""
+        return f"torsion spring of {self.turns:g} turns"
+
+    @property
     def error(self) -> float:
         """What rounding to stock costs: stiffness over the wanted one, less 1."""
         return self.stiffness / self.wanted - 1.0

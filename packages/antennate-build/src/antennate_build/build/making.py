@@ -56,7 +56,7 @@ class Product:
         parts: Printed parts by name.
         counts: How many of each.
         ups: Which direction of each points up while it is printed.
-        placed: Solids of the assembly by name.
+        placed: Solids of the assembly, each with its item of the bill.
         checks: What was checked.
         masses: What was compared.
         steps: Steps of the assembly, under their titles.
@@ -70,7 +70,7 @@ class Product:
     parts: dict[str, Solid] = field(default_factory=dict)
     counts: dict[str, int] = field(default_factory=dict)
     ups: dict[str, Up] = field(default_factory=dict)
-    placed: dict[str, Solid] = field(default_factory=dict)
+    placed: list[tuple[str, Solid]] = field(default_factory=list)
     checks: list[Check] = field(default_factory=list)
     masses: dict[str, Compared] = field(default_factory=dict)
     steps: dict[str, tuple[str, ...]] = field(default_factory=dict)
@@ -138,7 +138,7 @@ def _add_antenna(
         product.ups[name] = antenna_checks.up_of(name)
         tick()
     if config.what == "antenna":
-        product.placed = {part.name: part.solid for part in antenna.placed()}
+        product.placed = [(part.part, part.solid) for part in antenna.placed()]
     product.checks.append(antenna_checks.assembly_check(antenna, tick))
     product.checks += antenna_checks.spring_checks(antenna)
     product.masses |= antenna_masses(antenna)
@@ -181,8 +181,7 @@ def _add_links(
         product.counts[name] = robot.counts[name]
         product.ups[name] = robot_assembly.up_of(name)
         tick()
-    for n, (name, solid) in enumerate(whole):
-        product.placed[f"{name} {n + 1}"] = solid
+    product.placed = [(billing.item_of(config.robot, name), solid) for name, solid in whole]
     product.checks += robot_assembly.robot_checks(robot, tick)
     grams = {name: config.print.density * kernel.volume(s) for name, s in robot.printed.items()}
     screws = fasteners.of_links(robot)
@@ -242,17 +241,22 @@ def _printed(
             size_mm=[b - a for a, b in zip(low, high, strict=True)],
             wall_mm=part.wall,
             thin_at=part.thin,
-            closed=part.closed and kernel.count(solid) == 1,
+            closed=part.closed,
             supports=[
                 f"support at {each.height:.1f} mm, {each.area:.0f} mm²" for each in part.overhangs
             ],
         )
         files[f"stl/{name}.stl"] = checks.stl(part.mesh)
-        files[f"step/{name}.step"] = kernel.step({name: solid})
+        files[f"step/{name}.step"] = kernel.step([(name, solid)])
         tick()
     holes = [name for name, part in found.items() if not part.closed]
-    told = f"open: {', '.join(holes)}" if holes else f"{len(found)} meshes, each one closed body"
+    told = (
+        f"open or in pieces: {', '.join(holes)}"
+        if holes
+        else f"{len(found)} meshes, each one closed body"
+    )
     product.checks.append(Check("meshes", told, not holes))
+    product.checks.append(checks.walls_check(prints, config.print.wall_mm))
     product.checks.append(checks.layers_check(prints))
     return found, files
 

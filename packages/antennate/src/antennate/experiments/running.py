@@ -237,6 +237,7 @@ def keep(
     for name, make in experiment.files(config).items():
         if (content := make(outcome)) is not None:
             directory.write(name, content)
+            directory.kept = True  # with what says what it is of
     directory.finish(result, outcome.rows)
     if figures:
         directory.write_figures(experiment.figures(outcome))

@@ -166,6 +166,16 @@ def bought(robot: RobotSpec) -> list[Part]:
     return [*_servos(robot), *_electronics(robot), *_power(supply(robot))]
 
 
+def servo_item(model: ServoModel) -> str:
+    """Item of the bill that a servo is."""
+    return f"DYNAMIXEL {model.name}"
+
+
+def source_item(power: Supply) -> str:
+    """Item of the bill that feeds a robot."""
+    return "battery, three lithium cells" if power.on_cells else "power supply"
+
+
 def _servos(robot: RobotSpec) -> list[Part]:
     counts: Counter[tuple[ServoModel, str]] = Counter()
     names = [name for name, _, count in robot.groups for _ in range(count)]
@@ -174,7 +184,7 @@ def _servos(robot: RobotSpec) -> list[Part]:
     cables = len(robot.ids) + 1
     return [
         *(
-            Part(count, f"DYNAMIXEL {model.name}", name, _rating(model.rating))
+            Part(count, servo_item(model), name, _rating(model.rating))
             for (model, name), count in counts.items()
         ),
         Part(cables, "cable with three wires, JST EHR-03 at both ends", "servo bus", f"{PLUG:g} A"),
@@ -209,15 +219,9 @@ def _electronics(robot: RobotSpec) -> list[Part]:
 def _power(power: Supply) -> list[Part]:
     main, *others = power.rails
     amperes = f"{main.voltage:g} V, {power.stall:.1f} A"
+    capacity = f", {power.least_capacity:.1f} Ah or more" if power.on_cells else ""
     return [
-        Part(
-            1,
-            "battery, three lithium cells",
-            "all servos",
-            f"{amperes}, {power.least_capacity:.1f} Ah or more",
-        )
-        if power.on_cells
-        else Part(1, "power supply", "all servos", amperes),
+        Part(1, source_item(power), "all servos", amperes + capacity),
         Part(1, "fuse and holder", "at the plus pole of the supply", f"{power.fuse:g} A"),
         Part(
             1,
