@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from first_hour import Command, connect_each, move_each
+from first_hour import Command, OrderedTwin, connect_each, move_each
 from pages import Script
 
 from antennate.cli import main
@@ -71,6 +71,33 @@ def test_a_new_servo_becomes_a_calibrated_antenna_by_the_commands_of_the_page(
     assert not any(f"right {what}" in script.said for what in ("antenna", "noise", "calibration"))
     curve = json.loads((tmp_path / "left" / "calibration.json").read_text())
     assert curve["polarity"] == -1  # resistance rises with the bend, the fixed one leads to ground
+
+
+@pytest.mark.ci
+def test_setup_and_doctor_take_a_bench_by_its_name_and_record_needs_none(tmp_path: Path) -> None:
+    """Before there is a robot.toml, which `setup zero` leaves."""
+    with OrderedTwin(["twin", "--robot", "bench", "--orders", "-"], tmp_path) as twin:
+        board, bus = ["--esp32", twin.paths["esp32"]], ["--bus", twin.paths["bus"]]
+        doctor = Command(["doctor", "--robot", "bench", *board, *bus], tmp_path)
+        assert doctor.end() == 2
+        assert "run `antennate setup zero`" in doctor.output
+        jog = Command(["setup", "jog", "--robot", "bench", "--joint", BASE, *bus], tmp_path)
+        jog.until(rf"{BASE}: ")
+        jog.type("++q")
+        assert jog.end() == 0
+        assert "torque is off, verified" in jog.text
+        words = ["record", "--side", "left", "--duration", "1", "--out", "left.csv", *board]
+        record = Command(words, tmp_path)
+        assert record.end() == 0
+        assert len((tmp_path / "left.csv").read_text().splitlines()) > 50
+        zero = Command(["setup", "zero", "--robot", "bench", *bus], tmp_path)
+        move_each(zero, twin.order, [BASE])
+        assert zero.end() == 0, zero.text
+        made = tomllib.loads((tmp_path / "robot.toml").read_text())["robot"]
+        assert (made["base"], len(made["antennae"]["zeros"])) == ("bench", 1)
+        again = Command(["doctor", *board, *bus], tmp_path)
+        assert again.end() == 0, again.output
+        assert "right" not in again.output
 
 
 BENCH = RobotSpec.named("bench")

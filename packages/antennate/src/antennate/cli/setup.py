@@ -228,7 +228,8 @@ def _measure(person: TerminalPerson, config: ZeroConfig, options: ZeroOptions, p
         keep = options.keep_directions
         directions = list(robot.directions) if keep else zeroing.directions(person)
     missing = [name for name in robot.joint_names if name in unknown - zeroing.measured]
-    change(path, measured(robot, zeros, directions, missing, today()))
+    done = measured(robot, zeros, directions, missing, today())
+    change(path, _base(robot, path) | done)
     person.close()
     _show_zeros(robot, zeros, directions, zeroing.measured)
     named = () if path == USUAL else ("--config", str(path))
