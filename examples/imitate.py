@@ -32,7 +32,7 @@ from antennate.control.knowledge import Knowledge
 from antennate.control.policy.contract import contract_of
 from antennate.control.policy.writer import write_policy
 from antennate.errors import ConfigError
-from antennate.params.base import put_over
+from antennate.params.base import from_values, put_over
 from antennate.params.control import ControlParams
 from antennate.robots.spec import RobotSpec
 
@@ -75,7 +75,7 @@ def robot_of(name: str, frequency: float) -> RobotSpec:
     """The robot of a name or file, with legs that keep up with a frequency [Hz]."""
     robot = RobotSpec.named(name)
     legs = {"fastest": max(robot.legs.fastest, round(2.0 * np.pi * frequency + 0.005, 2))}
-    return RobotSpec.model_validate(put_over(robot.model_dump(), {"legs": legs}))
+    return from_values(RobotSpec, put_over(robot.model_dump(), {"legs": legs}))
 
 
 class Teacher(Search):

@@ -182,13 +182,14 @@ class Episodes:
                 require_room(trial.world)
                 episode = trial.episode(self.config.time_limit, on_its_back=True)
                 episode.progress_of(trial.world.head[:2])
+                route = route_of(episode.scene)
             except SceneError as error:
                 trouble = error
                 continue
             self._body.load(row, trial.world, trial.chance)
             self._gains[row], self._offsets[row] = gains, offsets
             self._episodes[row] = episode
-            self._routes[row], self._headings[row] = route_of(episode.scene), []
+            self._routes[row], self._headings[row] = route, []
             return trial.phase
         raise SceneError(
             f"expected an episode that can begin, found {_MOST_SKIPPED} that cannot: {trouble}"
@@ -230,10 +231,10 @@ class Episodes:
             truth.head[row, :2], truth.head[row, 2] = head, world.heading
             truth.force[row] = world.obstacle_force()
             truth.maneuver[row] = self._actor.maneuver[row]
-            self._headings[row] = [*self._headings[row], world.heading][-self._looks :]
-            if (route := self._routes[row]) is not None:
-                truth.side[row] = side_ahead(route, head, mean_direction(self._headings[row]))
             if truth.outcome[row] != OUTCOMES.index("invalid"):
+                self._headings[row] = [*self._headings[row], world.heading][-self._looks :]
+                if (route := self._routes[row]) is not None:
+                    truth.side[row] = side_ahead(route, head, mean_direction(self._headings[row]))
                 before, progress = episode.progress, episode.progress_of(head)
                 if not begins:
                     out = truth.outcome[row] == OUTCOMES.index("success")

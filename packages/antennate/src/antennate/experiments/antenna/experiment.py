@@ -126,8 +126,7 @@ def _of_springs(found: Springs) -> tuple[Table, Table]:
         "Sets to wind",
         {f"{each.wire_mm:.2f} mm": each for each in found.windings[:_SETS]},
         note=f"The best mandrel of each stock wire of {found.wire}, nearest first. For printed "
-        "parts wind the "
-        "springs of `antennate build` instead: its pins and stops are made for them."
+        "parts wind the springs of `antennate build` instead: its pins and stops are made for them."
         if found.windings
         else "",
     )
