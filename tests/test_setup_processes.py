@@ -87,6 +87,21 @@ def test_zero_takes_a_script_and_keeps_what_else_is_in_the_file(
     assert len(tomllib.loads(text)["zeros"]["missing"]) == 7
 
 
+@pytest.mark.ci
+def test_zero_without_a_file_keeps_what_was_said_of_the_robot(
+    twin: OrderedTwin, tmp_path: Path
+) -> None:
+    (tmp_path / "mine.toml").write_text("links = 2\nbody_radius = 0.018\n")
+    words = ["--bus", twin.paths["bus"], "--robot", "mine.toml", "--robot.legs.fastest", "5"]
+    twin.order("push all=0deg")
+    time.sleep(0.8)
+    run = ran(["setup", "zero", "--keep-directions", *words], tmp_path, "\n")
+    assert run.returncode == 0, run.stderr
+    made = tomllib.loads((tmp_path / "robot.toml").read_text())["robot"]
+    assert (made["links"], made["body_radius"], made["legs"]["fastest"]) == (2, 0.018, 5)
+    assert len(made["legs"]["zeros"]) == 4
+
+
 def test_jog_takes_keys_from_a_terminal_and_gives_it_back(twin: OrderedTwin) -> None:
     master, slave = pty.openpty()
     words = ["setup", "jog", "--bus", twin.paths["bus"], *SMALL, "--joint", "antenna_l_base"]

@@ -88,7 +88,7 @@ def test_numbers_of_a_joint_alone_are_those_of_a_formula(tmp_path: Path) -> None
 
 @pytest.mark.parametrize("amplitude", [0.5, 0.1])
 def test_interval_is_not_shorter_than_what_no_noise_shows(tmp_path: Path, amplitude: float) -> None:
-    """1.645 / √3 of: a timestep of 2 ms, half of 2π/4096 rad times 6.85 N·m/rad, 0.5 % and rounding.
+    """1.645 / √3 of: a timestep of 2 ms, half of 2π/4096 rad times 6.85 N·m/rad, 0.5 %, rounding.
 
     The stiffness is that of the servo as it is shipped, 1.7 N·m times its gain.
     """

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import shutil
 from collections.abc import Callable
 from dataclasses import replace
 from itertools import accumulate
@@ -134,9 +135,11 @@ def test_fit_with_poses_judges_the_speed(tmp_path: Path) -> None:
     """The chord of the circle in mm, beside what both robots walk; and the gap on the page."""
     log, table = walk(tmp_path, (4.0, 4.25))
     (file := tmp_path / "small.toml").write_text(TEXT)
-    config = FitConfig(log=(str(log),), robot=str(file), robots=20, poses=(str(table),))
-    result = run(config, 1).result()
-    forward = next(step for step in result.steps if step.step == "FORWARD")
+    again = shutil.copy(log, tmp_path / "again.mcap")
+    logs, poses = (str(log), str(again)), (str(table), "none")
+    result = run(FitConfig(log=logs, robot=str(file), robots=20, poses=poses), 1).result()
+    forward, unseen = (step for step in result.steps if step.step == "FORWARD")
+    assert (unseen.log, unseen.speed_mm) == ("again", None)
     chord = 2e3 * SPEED / RATE * math.sin(RATE * PERIOD / 2.0)
     assert forward.speed_mm == pytest.approx(chord, rel=5e-3)
     assert forward.speed_before_mm is not None
@@ -152,7 +155,9 @@ def test_table_that_belongs_to_nothing_is_refused(
     Path("small.toml").write_text(TEXT)
     log, table = walk(tmp_path)
     words = ("--robot", "small.toml", "--poses", table)
-    assert "poses: expected a table for each log, 2, found 1" in refused("fit", log, log, *words)
+    assert "poses: expected a table or the word none for each log, 2, found 1" in refused(
+        "fit", log, log, *words
+    )
     assert "take.csv: expected metres" in refused("fit", log, *words, "--unit", "0.001")
     alone = refused("fit", log, "--robot", "small.toml", "--unit", "0.001")
     assert "unit: expected the default, as there are no poses, found another" in alone

@@ -22,6 +22,9 @@ from antennate.params.base import (
 from antennate.robots.servos import ServoName
 from antennate.robots.spec import ROBOTS, RobotSpec
 
+NO_POSES = "none"
+"""Stands for the table of a log without motion capture."""
+
 
 class FitConfig(Params):
     """Everything that decides the outcome of `antennate fit`."""
@@ -46,8 +49,8 @@ class FitConfig(Params):
     )
     """Model of the servo that was recorded; logs name theirs."""
     poses: tuple[str, ...] = number((), "1", "assumed: most have no motion capture", metavar="FILE")
-    """Tables of motion capture, CSV or TRC, one for each log in their order: speed and turn of
-    walks count too."""
+    """Tables of motion capture, CSV or TRC, one for each log in their order, `none` for a log
+    without: speed and turn of walks count too."""
     markers: tuple[str, ...] = number(
         (),
         "1",

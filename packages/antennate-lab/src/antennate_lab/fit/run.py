@@ -18,7 +18,7 @@ from antennate.studies.trials import OnStep, no_step
 from antennate.telemetry.mocap import Poses, poses_of
 from antennate.types import Floats
 from antennate_lab.fit import least_squares, measures, recording, regression
-from antennate_lab.fit.config import FitConfig
+from antennate_lab.fit.config import NO_POSES, FitConfig
 from antennate_lab.fit.estimates import Estimate, correlations, of_air, of_legs
 from antennate_lab.fit.least_squares import Problem
 from antennate_lab.fit.parameters import BACKLASH, LEG, Parameter, changed, parameters
@@ -160,15 +160,22 @@ def run(config: FitConfig, workers: int | Workers, on_step: OnStep = no_step) ->
 
 def _seen(config: FitConfig, paths: Sequence[Path]) -> list[tuple[str, Poses] | None]:
     """Motion capture beside each log: name of its table, and its poses in the time of the log."""
-    how = (config.markers, config.unit, config.up, config.mirrored)
     if not config.poses:
         return [None] * len(paths)
     if len(config.poses) != len(paths):
         raise BadInputError(
-            f"poses: expected a table for each log, {len(paths)}, found {len(config.poses)}"
+            f"poses: expected a table or the word {NO_POSES} for each log, {len(paths)}, found "
+            f"{len(config.poses)}"
         )
-    pairs = zip(paths, config.poses, strict=True)
-    return [(Path(name).name, poses_of(path, Path(name), *how)) for path, name in pairs]
+
+    def seen(path: Path, name: str) -> tuple[str, Poses] | None:
+        if name == NO_POSES:
+            return None
+        table = Path(name)
+        told = poses_of(path, table, config.markers, config.unit, config.up, config.mirrored)
+        return table.name, told
+
+    return [seen(*pair) for pair in zip(paths, config.poses, strict=True)]
 
 
 def with_told(robot: RobotSpec, found: Sequence[Estimate]) -> RobotSpec:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from pathlib import Path
+from typing import Any, cast
 
 from pydantic.dataclasses import dataclass
 
@@ -110,6 +111,7 @@ def _ports(person: TerminalPerson, config: SetupConfig, options: SetupOptions, p
             pass
     listing = ports_like(options.among) if options.among else all_ports
     clock, known = HostClock(), {"bus": options.bus, "esp32": options.esp32}
+    base = _base(config.robot, path)
     for name, what in (("bus", "adapter of the servo bus"), ("esp32", "antenna board")):
         if not known[name]:
             known[name] = find_port(
@@ -121,15 +123,30 @@ def _ports(person: TerminalPerson, config: SetupConfig, options: SetupOptions, p
             )
     if not known["bus"]:
         raise ConfigError("--bus: expected a serial port, found none; nothing can be set up")
-    change(path, _base(config.robot, path) | {("ports", n): p for n, p in known.items() if p})
+    change(path, base | {("ports", n): p for n, p in known.items() if p})
     return known["bus"]
 
 
 def _base(robot: RobotSpec, path: Path) -> dict[Key, Value]:
-    """The name of a robot that is not the default, for a new file, which later commands read."""
-    names = () if path.exists() else ROBOTS[1:]
-    name = next((name for name in names if RobotSpec.named(name) == robot), None)
-    return {("robot", "base"): name} if name else {}
+    """What a new file says of a robot that is not the default, so that later commands read it."""
+    if path.exists():
+        return {}
+    own = robot.model_dump()
+    apart = {name: dict(_apart(RobotSpec.named(name).model_dump(), own)) for name in ROBOTS}
+    name = min(ROBOTS, key=lambda name: len(apart[name]))
+    base: dict[Key, Value] = {} if name == ROBOTS[0] else {("robot", "base"): name}
+    return base | apart[name]
+
+
+def _apart(
+    base: Mapping[str, Any], own: Mapping[str, Any], *groups: str
+) -> Iterator[tuple[Key, Value]]:
+    """Keys of a robot that differ from those of another, and their values."""
+    for name, value in own.items():
+        if isinstance(value, Mapping):
+            yield from _apart(base[name], cast("Mapping[str, Any]", value), *groups, name)
+        elif value != base[name]:
+            yield ("robot", *groups, name), value
 
 
 def _servos(
@@ -214,6 +231,7 @@ def zero(argv: Sequence[str]) -> int:
 
 def _measure(person: TerminalPerson, config: ZeroConfig, options: ZeroOptions, path: Path) -> int:
     robot, clock = config.robot, HostClock()
+    base = _base(robot, path)
     unknown = {*robot.unstated("directions"), *config.zeros.missing}
     require_changeable(path, measured(robot, robot.zeros, robot.directions, (), today()))
     with master(opener_of(options.bus, "--bus"), robot.baud, clock.now) as bus:
@@ -229,7 +247,7 @@ def _measure(person: TerminalPerson, config: ZeroConfig, options: ZeroOptions, p
         directions = list(robot.directions) if keep else zeroing.directions(person)
     missing = [name for name in robot.joint_names if name in unknown - zeroing.measured]
     done = measured(robot, zeros, directions, missing, today())
-    change(path, _base(robot, path) | done)
+    change(path, base | done)
     person.close()
     _show_zeros(robot, zeros, directions, zeroing.measured)
     named = () if path == USUAL else ("--config", str(path))
