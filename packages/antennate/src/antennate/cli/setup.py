@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
+from pydantic import BaseModel
 from pydantic.dataclasses import dataclass
 
 from antennate.cli.keys import END, ReadKeys, TerminalPerson, typed_keys
@@ -131,22 +132,22 @@ def _base(robot: RobotSpec, path: Path) -> dict[Key, Value]:
     """What a new file says of a robot that is not the default, so that later commands read it."""
     if path.exists():
         return {}
-    own = robot.model_dump()
-    apart = {name: dict(_apart(RobotSpec.named(name).model_dump(), own)) for name in ROBOTS}
+    apart = {name: dict(_apart(RobotSpec.named(name), robot)) for name in ROBOTS}
     name = min(ROBOTS, key=lambda name: len(apart[name]))
     base: dict[Key, Value] = {} if name == ROBOTS[0] else {("robot", "base"): name}
     return base | apart[name]
 
 
-def _apart(
-    base: Mapping[str, Any], own: Mapping[str, Any], *groups: str
-) -> Iterator[tuple[Key, Value]]:
+def _apart(base: BaseModel, own: BaseModel, *groups: str) -> Iterator[tuple[Key, Any]]:
     """Keys of a robot that differ from those of another, and their values."""
-    for name, value in own.items():
-        if isinstance(value, Mapping):
-            yield from _apart(base[name], cast("Mapping[str, Any]", value), *groups, name)
-        elif value != base[name]:
-            yield ("robot", *groups, name), value
+    for name, value in own:
+        other = getattr(base, name)
+        if isinstance(value, BaseModel):
+            yield from _apart(other, value, *groups, name)
+        elif value != other:
+            tables = isinstance(value, tuple) and any(isinstance(v, BaseModel) for v in value)
+            whole = [each.model_dump(mode="json") for each in value] if tables else value
+            yield ("robot", *groups, name), whole
 
 
 def _servos(
