@@ -91,7 +91,10 @@ def test_zero_takes_a_script_and_keeps_what_else_is_in_the_file(
 def test_zero_without_a_file_keeps_what_was_said_of_the_robot(
     twin: OrderedTwin, tmp_path: Path
 ) -> None:
-    (tmp_path / "mine.toml").write_text("links = 2\nbody_radius = 0.018\n")
+    (tmp_path / "mine.toml").write_text(
+        "links = 2\nbody_radius = 0.018\n[antenna]\nranges = [1.2, 1.3, 1.3, 1.3, 1.3, 1.3]\n"
+        '[imu]\nkind = "head"\n'
+    )
     words = ["--bus", twin.paths["bus"], "--robot", "mine.toml", "--robot.legs.fastest", "5"]
     twin.order("push all=0deg")
     time.sleep(0.8)
@@ -100,6 +103,8 @@ def test_zero_without_a_file_keeps_what_was_said_of_the_robot(
     made = tomllib.loads((tmp_path / "robot.toml").read_text())["robot"]
     assert (made["links"], made["body_radius"], made["legs"]["fastest"]) == (2, 0.018, 5)
     assert len(made["legs"]["zeros"]) == 4
+    assert made["antenna"] == {"ranges": [1.2, 1.3, 1.3, 1.3, 1.3, 1.3]}
+    assert ("base" not in made, made["imu"]) == (True, {"kind": "head"})
 
 
 def test_jog_takes_keys_from_a_terminal_and_gives_it_back(twin: OrderedTwin) -> None:
