@@ -80,7 +80,7 @@ def test_setup_and_doctor_take_a_bench_by_its_name_and_record_needs_none(tmp_pat
         board, bus = ["--esp32", twin.paths["esp32"]], ["--bus", twin.paths["bus"]]
         doctor = Command(["doctor", "--robot", "bench", *board, *bus], tmp_path)
         assert doctor.end() == 2
-        assert "run `antennate setup zero`" in doctor.output
+        assert "antennate setup zero`" in doctor.output  # behind `uv run` if that ran the tests
         jog = Command(["setup", "jog", "--robot", "bench", "--joint", BASE, *bus], tmp_path)
         jog.until(rf"{BASE}: ")
         jog.type("++q")

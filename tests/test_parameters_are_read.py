@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from protocol_logs import CONTROL, sweeps, write
+from protocol_logs import CONTROL, sweeps, walk, write
 from pydantic import ValidationError
 from recorded import act, leaves, meet_ground, recorded, tried
 from servo_recordings import of_twin
@@ -271,7 +271,10 @@ TINY: dict[str, list[dict[str, Any]]] = {
             )
         ),
     ],
-    "fit": [{"log": ["small.mcap"], "robot": "small.toml", "robots": 20, "seed": 1}],
+    "fit": [
+        {"log": ["small.mcap"], "robot": "small.toml", "robots": 20, "seed": 1},
+        {"log": ["walk.mcap"], "robot": "small.toml", "robots": 20, "poses": ["take.csv"]},
+    ],
     "reproduce": [{"quick": True}],
     "build": [
         {
@@ -314,6 +317,7 @@ def test_every_parameter_of_an_experiment_is_read_or_refused(
     small = RobotSpec.named("small.toml")
     steps = *sweeps(small, "leg_l0").steps, Step(maneuver="FORWARD", seconds=2.0)
     write(Path("small.mcap"), small, Protocol(steps=steps).made_for(small, CONTROL))
+    walk(Path())
     monkeypatch.setattr(reproduce, "QUICK", PARTS)
     # a bisection that is given no configuration, and takes long
     monkeypatch.setattr(force, "largest_force", lambda chain, limit: 0.05)

@@ -6,56 +6,23 @@ import math
 import shutil
 from collections.abc import Callable
 from dataclasses import replace
-from itertools import accumulate
 from pathlib import Path
 
 import numpy as np
 import pytest
-from protocol_logs import CONTROL, sweeps, write
+from protocol_logs import CONTROL, PERIOD, RATE, SMALL, SPEED, sweeps, walk, write
 
-from antennate.control.protocol import Protocol, Step, targets
+from antennate.control.protocol import Step, targets
 from antennate.errors import BadInputError
 from antennate.robots.spec import RobotSpec
 from antennate.telemetry.mocap import poses_of
-from antennate.telemetry.reader import LogReader
 from antennate.types import Floats
 from antennate_lab.fit import measures, recording, regression
 from antennate_lab.fit.config import FitConfig
 from antennate_lab.fit.run import run
 from antennate_lab.fit.simulated import Course, simulated
 
-SMALL = RobotSpec(links=2, mass=0.8, antennae={"kind": "none"})  # type: ignore[arg-type]
 TEXT = 'links = 2\nmass = 0.8\n\n[antennae]\nkind = "none"\n'
-SPEED, RATE = 0.05, 0.1
-"""Of the head along a circle [m/s], [rad/s]."""
-WALKS = (("FORWARD", 0.5, 6.0), ("TURN_L", 0.5, 4.0), ("TURN_R", 0.8, 2.6))
-PERIOD = 2.0
-"""Of the first two walks [s]."""
-
-
-def walk(folder: Path, *gaps: tuple[float, float], pace: float = 1.0) -> tuple[Path, Path]:
-    """A log that follows its commands, and a table of its head on a circle.
-
-    Args:
-        folder: Where they are written.
-        gaps: Times of the log without rows in the table [s].
-        pace: Of the clock of the table.
-    """
-    steps = [Step(name="stand", seconds=1.0)]
-    steps += [Step(name=m, maneuver=m, frequency=f, seconds=s) for m, f, s in WALKS]  # type: ignore[arg-type]
-    log = write(folder / "walk.mcap", SMALL, Protocol(steps=tuple(steps)).made_for(SMALL, CONTROL))
-    yaw = SMALL.places("yaw")
-    with LogReader(log) as reader:
-        rows = [(x.now, sum(accumulate(x.positions[yaw])) / SMALL.links) for x in reader]
-    t = np.arange(0.0, rows[-1][0], 0.01)
-    heading = RATE * t - np.interp(t, *np.array(rows).T)
-    x, y = SPEED / RATE * np.sin(RATE * t), SPEED / RATE * (1.0 - np.cos(RATE * t))
-    sound = ~np.any([(t > begin) & (t < end) for begin, end in (*gaps, (-2.0, -1.0))], axis=0)
-    table = folder / "take.csv"
-    cells = np.column_stack([300.0 + pace * t, x, y, heading])[sound].tolist()
-    lines = (",".join(f"{value:.6f}" for value in row) for row in cells)
-    table.write_text("\n".join(["time,x,y,heading", *lines, ""]))
-    return log, table
 
 
 def read(log: Path, table: Path) -> recording.Recording:
