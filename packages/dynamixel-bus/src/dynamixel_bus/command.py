@@ -45,6 +45,10 @@ class _Parser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
         raise BadInputError(message)
 
+    def _print_message(self, message: str, file: object = None) -> None:
+        """Write a text of --help or --version; Python 3.11 to 3.13 lose or raise its errors."""
+        _print(message)
+
 
 class FaultyServer(Server):
     """A server whose servos fail on demand.
@@ -132,11 +136,7 @@ def _print(text: str) -> None:
 def _read(argv: Sequence[str] | None) -> argparse.Namespace:
     """Words of the command; servos behind `--fault` are servos."""
     parser = _parser()
-    try:
-        given = parser.parse_args(argv)
-    except SystemExit:  # of --help and --version, whose text still waits
-        _print("")
-        raise
+    given = parser.parse_args(argv)
     given.servos += filter(servo_list.is_listed, given.fault)
     given.fault = [word for word in given.fault if not servo_list.is_listed(word)]
     if not given.servos:
