@@ -26,6 +26,7 @@ from cyclonedds.topic import Topic
 from ros_peer import JointState, String, TFMessage, reader, rubbish, state, taken
 from scipy.spatial.transform import Rotation
 from stated import STATED
+from test_drive_cases import was_late
 from test_drive_processes import NO_SERVO, twin
 from view_rig import ANTENNATE, PATIENCE, Shown, share_cores, shown
 
@@ -243,13 +244,19 @@ def test_a_client_reads_joints_a_hundred_times_a_second(tmp_path: Path) -> None:
 def test_a_robot_walks_by_goals_and_holds_without_them(tmp_path: Path) -> None:
     """Rubbish between them is counted."""
     words = ["--arm", "--accept", "--dry-run", "1", "--duration", "18", *NO_SERVO]
-    with (
-        driven(tmp_path, *words) as (_, result),
-        peer("goals", "16", "0.1", *NAMES),
-        peer("rubbish", "16"),
-    ):
-        end = result()
-    with LogReader(tmp_path / "run" / "drive.mcap") as log:
+    for number in range(3):
+        (folder := tmp_path / str(number)).mkdir()
+        with (
+            driven(folder, *words) as (command, _),
+            peer("goals", "16", "0.1", *NAMES),
+            peer("rubbish", "16"),
+        ):
+            code = command.process.wait(PATIENCE)
+        end = json.loads((folder / "run" / "result.json").read_text())
+        if not was_late(end):
+            break
+    assert code == 0, end
+    with LogReader(folder / "run" / "drive.mcap") as log:
         ticks = [one for one in log if one.sent]
     walked = [one for one in ticks if one.maneuver == Maneuver.FORWARD]
     assert end["controller"] == "goals"
