@@ -145,8 +145,8 @@ def of_legs(robot: RobotSpec, legs: Told, prior: Known, rng: np.random.Generator
     for p, each in enumerate(chosen):
         ends = np.quantile(after[:, p], [0.05, 0.95])
         told = bool(np.ptp(ends) < TOLD * np.ptp(np.quantile(before[:, p], [0.05, 0.95])))
-        value = float(np.exp(np.median(after[:, p]))) if told else each.start
-        interval = (float(np.exp(ends[0])), float(np.exp(ends[1])))
+        value = each.value(float(np.median(after[:, p]))) if told else each.start
+        interval = (each.value(float(ends[0])), each.value(float(ends[1])))
         errors = after[:_DRAWS, p] - np.median(after[:, p])
         found.append(Estimate(each, value, interval, told, "floor", errors))
     return found
