@@ -26,7 +26,7 @@ from antennate.studies.pool import Workers
 from antennate.types import Floats
 from antennate_lab.fit import compare, least_squares, measures, recording, regression, robot_file
 from antennate_lab.fit.config import FitConfig
-from antennate_lab.fit.estimates import Estimate, of_air
+from antennate_lab.fit.estimates import Estimate, of_air, of_legs
 from antennate_lab.fit.experiment import sentence
 from antennate_lab.fit.parameters import LEG, SCALES, changed, parameters
 from antennate_lab.fit.result import FitResult, StepRow
@@ -145,6 +145,18 @@ def test_friction_of_a_leg_is_the_common_one_times_its_own() -> None:
     robot = changed(SMALL, chosen, [0.4, 0.4, 0.2, 0.4])
     assert robot.leg_friction == 0.4
     assert robot.legs.friction_factors == (1.0, 1.0, 0.5, 1.0)
+
+
+def test_leg_beyond_what_a_robot_may_have_is_not_told() -> None:
+    """Three times the friction that all share; a robot's file allows twice."""
+    robot = RobotSpec(links=2)
+    found = np.log(0.5 * np.array([1.0, 1.0, 1.0, 3.0]))
+    prior = regression.Known(np.full(4, np.log(0.6)), np.full(4, 0.4), 0.4)
+    legs = regression.Told(found, np.full(4, 0.01), np.eye(4))
+    common, *_, far = of_legs(robot, legs, prior, np.random.default_rng(1))
+    assert common.told
+    assert common.value == pytest.approx(0.5, rel=0.01)
+    assert (far.told, far.value) == (False, 1.0)
 
 
 def test_backlash_drives_what_a_simulation_feels() -> None:

@@ -144,8 +144,11 @@ def of_legs(robot: RobotSpec, legs: Told, prior: Known, rng: np.random.Generator
     found = []
     for p, each in enumerate(chosen):
         ends = np.quantile(after[:, p], [0.05, 0.95])
-        told = bool(np.ptp(ends) < TOLD * np.ptp(np.quantile(before[:, p], [0.05, 0.95])))
-        value = each.value(float(np.median(after[:, p]))) if told else each.start
+        middle = float(np.median(after[:, p]))
+        sound = each.scale.low < np.exp(middle) < each.scale.high  # else no such robot can be
+        narrow = np.ptp(ends) < TOLD * np.ptp(np.quantile(before[:, p], [0.05, 0.95]))
+        told = bool(sound and narrow)
+        value = each.value(middle) if told else each.start
         interval = (each.value(float(ends[0])), each.value(float(ends[1])))
         errors = after[:_DRAWS, p] - np.median(after[:, p])
         found.append(Estimate(each, value, interval, told, "floor", errors))
