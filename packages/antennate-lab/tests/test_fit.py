@@ -86,6 +86,23 @@ def test_numbers_of_a_joint_alone_are_those_of_a_formula(tmp_path: Path) -> None
     assert delay.interval[0] < DELAY < delay.interval[1]  # by its floor: noise is a tenth of it
 
 
+@pytest.mark.ci
+def test_search_that_begins_without_a_delay_is_not_held_there(tmp_path: Path) -> None:
+    """A simulated delay is none or at least 2 ms, a step of the engine; this servo has none."""
+    path = write(tmp_path / "drive.mcap", SMALL, sweeps(SMALL, "leg_l0", seconds=2.0))
+    (course,) = recording.read(path, SMALL).courses
+    own = SMALL.servos.xc430_w240.model_copy(update={"gain_divisor": GAIN})
+    servos = SMALL.servos.model_copy(update={"xc430_w240": own})
+    made = simulated(SMALL.model_copy(update={"servos": servos}), course).positions
+    unit = 2.0 * math.pi / 4096
+    measured = replace(course, positions=np.rint(made / unit) * unit)
+    names = [(f"servos.xc430_w240.{name}", None) for name in ("gain_divisor", "delay", "armature")]
+    problem = least_squares.Problem(SMALL, [measured], parameters(SMALL, names), Workers(1))
+    gain, delay, _ = least_squares.solve(problem, problem.start).x
+    assert math.exp(gain) == pytest.approx(GAIN, rel=0.01)
+    assert delay == 0.0
+
+
 @pytest.mark.parametrize("amplitude", [0.5, 0.1])
 def test_interval_is_not_shorter_than_what_no_noise_shows(tmp_path: Path, amplitude: float) -> None:
     """1.645 / √3 of: a timestep of 2 ms, half of 2π/4096 rad times 6.85 N·m/rad, 0.5 %, rounding.

@@ -15,7 +15,7 @@ import numpy as np
 from antennate.robots.spec import RobotSpec
 from antennate.types import Floats
 from antennate_lab.fit.least_squares import Problem, Solution
-from antennate_lab.fit.parameters import BACKLASH, Parameter, bounds, parameters
+from antennate_lab.fit.parameters import BACKLASH, SHORTEST, Parameter, bounds, parameters
 from antennate_lab.fit.regression import Known, Told
 from antennate_lab.fit.result import Correlation, ParameterRow
 from dynamixel_bus.model import POSITION_UNIT
@@ -24,8 +24,6 @@ LEVEL = 1.645
 """Half the width of a 90 % interval of a normal distribution [standard deviations]."""
 TOLD = 0.5
 """A parameter is told if its interval is narrower than this share of what was known before."""
-SHORTEST = 0.002
-"""Delays up to the timestep of the physics are alike [s]."""
 SHARE = 0.005
 """Share of its value by which a gain, an inertia, a spring or a factor may be off because the model
 and its numerics leave something out: what fits missed of two simulated robots (docs/fit.md)."""

@@ -19,7 +19,7 @@ from antennate.robots.spec import RobotSpec
 from antennate.studies.pool import Workers, gather
 from antennate.studies.trials import OnStep, no_step
 from antennate.types import Bools, Floats, Ints
-from antennate_lab.fit.parameters import BACKLASH, Parameter, bounds, changed
+from antennate_lab.fit.parameters import BACKLASH, SHORTEST, Parameter, bounds, changed
 from antennate_lab.fit.residuals import NOISE, channels, labels, moving, pieces
 from antennate_lab.fit.simulated import Course, simulated
 
@@ -80,6 +80,8 @@ class Problem:
         self.spread = np.array([each.scale.spread for each in self.chosen])
         self.nudge = np.array([each.scale.nudge for each in self.chosen])
         self.plays = np.array([each.path == BACKLASH for each in self.chosen])
+        delays = np.array([each.path.endswith("delay") for each in self.chosen])
+        self.smallest = np.where(self.plays, self.nudge, np.where(delays, SHORTEST / 2.0, -np.inf))
 
     def _tells(self, course: Course, measured: Floats) -> Bools:
         """Which parameters change what is measured in a course."""
@@ -173,11 +175,12 @@ class Problem:
         return found
 
     def snapped(self, x: Floats) -> Floats:
-        """The place with backlashes below a nudge at 0.
+        """The place with backlashes below a nudge, and delays of half a timestep, at 0.
 
-        The ends of a play are soft, so that one of nearly 0 differs from none.
+        The ends of a play are soft, and a delay is at least a timestep, so that one of nearly 0
+        differs from none.
         """
-        return np.where(self.plays & (x < self.nudge), 0.0, x)
+        return np.where(x < self.smallest, 0.0, x)
 
     def prior(self, x: Floats) -> Floats:
         """How far a place is from what was known before, in its standard deviations."""

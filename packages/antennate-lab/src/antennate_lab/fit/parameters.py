@@ -22,6 +22,8 @@ LEG = "legs.friction"
 """Friction of one leg on the floor: `leg_friction` times its `legs.friction_factors`."""
 BACKLASH = "yaw.backlash"
 """Backlash of one yaw joint."""
+SHORTEST = 0.002
+"""Delays up to the timestep of the physics are alike, but for none at all [s]."""
 
 
 @dataclass(frozen=True)
