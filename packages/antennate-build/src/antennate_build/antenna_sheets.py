@@ -226,6 +226,9 @@ def bracket_sheet(antenna: AntennaSolids) -> Figure:
     side.draw(part, hidden=True)
     end = View(axes, (180.0, 84.0), scale, *END)
     end.draw(part, hidden=True)
+    named = {(14.0, 196.0): "from above", (14.0, 106.0): "from the right"}
+    for at, words in (named | {(138.0, 106.0): "from the front"}).items():
+        sheet.text(axes, at, words, weight="bold")
     oblique = View(axes, (215.0, 158.0), 0.8 * scale, (0.6, -0.65, 0.45), (0.0, 0.0, 1.0))
     oblique.draw(part, colour=PALE["printed"])
     circles, opening = flange.flange_circles(layout, mount), flange.opening_radius(layout, mount)

@@ -37,7 +37,7 @@ def link_sheet(robot: RobotSolids) -> Figure:
     """A link with its servos from three sides, with its sizes and its hinge."""
     layout, spec = robot.layout, robot.layout.robot
     notes = (
-        "1 : 1.33; servos grey",
+        "3 : 4; servos grey",
         f"{layout.print.material.upper()}, plates {PLATE:g}",
         f"holes: {layout.leg.source.partition(';')[0]}",
     )
