@@ -65,6 +65,7 @@ def test_without_an_approach_the_first_motion_runs_at_the_limit() -> None:
     assert int((seen.speeds[:100] >= LIMIT - ROUNDING).sum()) == 100
 
 
+@pytest.mark.ci
 def test_the_first_motion_is_slow_and_the_gait_begins_where_it_ends() -> None:
     seen = Seen(approach=1.0, duration=4.0)
     assert seen.report.worst <= State.DEGRADED

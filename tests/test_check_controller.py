@@ -266,6 +266,7 @@ BROKEN = {
 }
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("kind", BROKEN, ids=lambda kind: kind.__name__)
 def test_a_broken_controller_is_told_what_is_broken(kind: Any) -> None:
     with pytest.raises(AssertionError, match=BROKEN[kind]):

@@ -517,6 +517,7 @@ def test_interrupted_in_the_middle_keeps_the_finished_trials(capsys, tmp_path, m
     assert json.loads((tmp_path / "run" / "result.json").read_text())["interrupted"] is True
 
 
+@pytest.mark.ci
 def test_gait_runs_and_writes_its_result(capsys, tmp_path):
     words = ["gait", "--cycles", "2", "--settling-cycles", "0", "--sweep-points", "2"]
     words += ["--gait.frequency", "0.8"]  # a short cycle

@@ -182,6 +182,7 @@ def test_what_is_felt_is_counted_by_hand():
     assert stats.poisson.cdf(2, 0.5 * high) == pytest.approx(0.025)
 
 
+@pytest.mark.ci
 def test_a_run_leaves_its_tables_and_figures(tmp_path):
     out = tmp_path / "run"
     words = ["climb", "--trials", "1", "--heights", "0.05", "--conditions", "climb", "level"]

@@ -185,6 +185,7 @@ def test_M7_G7_all_worlds_decide_the_same_for_a_whole_trial(
     assert Maneuver.REVERSE in same_everywhere(tmp_path, name, trial, math.inf)
 
 
+@pytest.mark.ci
 def test_G7_a_session_with_a_silent_board_is_replayed_to_the_bit(tmp_path: Path) -> None:
     """Before torque, walking, held, and walking again: as the log says, and as it was."""
     live = session(tmp_path, "closed", 1, blind=200)

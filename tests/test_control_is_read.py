@@ -66,6 +66,7 @@ ACTS: dict[str, Callable[[ControlParams, RobotSpec], None]] = {
 }
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize(
     "robot", [FEELING, LIFTING], ids=["rolling, with inertial sensor", "lifting"]
 )

@@ -158,6 +158,7 @@ def test_swapping_the_antennae_swaps_the_turns_and_mirrors_the_gait(name: str) -
     assert there["yaw"] == pytest.approx(-here["yaw"], abs=1e-9)
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("name", BUILT_IN)
 def test_a_row_that_is_reset_says_what_a_new_controller_says(name: str) -> None:
     counts = streams(900, 2)

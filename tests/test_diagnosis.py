@@ -348,6 +348,7 @@ def test_S11_beyond_the_calibrated_range_is_flagged_and_kept_as_in_simulation(
     assert {r.counts for r in found[-10:]} == {round(beyond), round(beyond) + 1}
 
 
+@pytest.mark.ci
 def test_S11_the_antennae_of_a_good_twin_stay_within_what_its_curve_covers() -> None:
     """As the tunnel bends them; `twin --robot-toml` writes that. On a robot nothing is assumed."""
     assert SupervisorParams().covered == 0.0

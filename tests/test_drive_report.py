@@ -150,6 +150,7 @@ def test_why_is_of_the_longest_time_in_the_worst_state() -> None:
     assert report.result(made.session)["worst_s"] == pytest.approx(0.7, abs=0.2)
 
 
+@pytest.mark.ci
 def test_S14_why_tells_a_hum_as_large_as_it_was() -> None:
     """Mains of 50.2 Hz alternate by 400 sin(0.4 pi t + 1): little at 1.75 s, 400 at 2.95 s."""
 
@@ -365,6 +366,7 @@ def test_a_computer_that_is_late_is_named(pause: float, named: bool) -> None:
     assert any("SILENT_SERVO may come from that" in one for one in late_sentence(faulty)) == named
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize(("loss", "named"), [(0.0, False), (0.03, True)])
 def test_where_one_tick_in_a_hundred_is_missed_missed_answers_tell_a_late_computer(
     loss: float, named: bool

@@ -30,6 +30,7 @@ def same(name: str, trial: int, ticks: float, phase: float = 0.0) -> tuple[set[i
 SLOW = [pytest.param(phase, marks=pytest.mark.slow) for phase in (0.001, 0.0055)]
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("phase", [0.0, 0.003, 0.008, *SLOW])
 def test_M7_drive_decides_as_the_pure_simulation_from_the_first_reading_on(phase: float) -> None:
     met, ticks, _ = same("paper", 0, 250, phase)

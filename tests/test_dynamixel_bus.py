@@ -249,6 +249,7 @@ class Fragile(SimulatedWire):
         return super().drain()
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("fast", [True, False])
 def test_B5_the_bus_works_after_an_exception_anywhere(fast: bool) -> None:
     raised = 0

@@ -237,6 +237,7 @@ class Order(HTMLParser):
         self.text += data
 
 
+@pytest.mark.ci
 def test_a_line_each_says_what_the_controllers_are_and_the_report_begins_with_a_picture(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -88,6 +88,7 @@ class Hand:
             self.torque.append(self.t)
 
 
+@pytest.mark.ci
 def test_without_a_key_there_is_no_torque_and_after_its_release_first_no_motion() -> None:
     made, hand = rig(TwinConfig()), Hand()
     params = DeadManParams(off=1.5)

@@ -266,6 +266,7 @@ def test_a_message_is_that_of_ros(tmp_path: Path) -> None:
     np.testing.assert_array_equal(numbers[25:28], series.linear_acceleration[-1])
 
 
+@pytest.mark.ci
 def test_a_drive_is_logged_exported_and_replayed_to_the_bit(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

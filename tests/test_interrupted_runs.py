@@ -104,6 +104,7 @@ def test_an_interrupted_run_names_the_whole_command_that_goes_on(
     assert result["controllers"]["open"]["trials"] == 3
 
 
+@pytest.mark.ci
 def test_an_interrupted_gait_goes_on_after_the_walks_that_had_ended(capsys, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     monkeypatch.delenv("UV", raising=False)
@@ -211,6 +212,7 @@ def test_a_disk_that_takes_no_trial_does_not_promise_more_than_it_holds(
     assert store.exists() == bool(kept)
 
 
+@pytest.mark.ci
 def test_a_refused_command_leaves_a_finished_run_as_it_is(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

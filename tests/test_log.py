@@ -583,6 +583,7 @@ def test_G1_a_killed_program_loses_a_quarter_of_a_second_at_most(
     assert max(given for given, *_ in results) > 30
 
 
+@pytest.mark.ci
 def test_G3_a_power_cut_loses_a_second_at_most(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -361,6 +361,7 @@ def test_info_finds_ticks_that_cannot_be_read_in_a_sound_file(
     assert (code, told["ticks"]) == (2, 0)
 
 
+@pytest.mark.ci
 def test_plot_draws_it(log: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["log", "plot", str(log)]) == 0
     assert f"ticks were drawn into {log.with_suffix('.png')}" in capsys.readouterr().out
@@ -369,6 +370,7 @@ def test_plot_draws_it(log: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert Path("a.svg").read_text().count("<path") > 20
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("now", [None, 0.5], ids=["any times", "one time"])
 def test_plot_draws_a_log_of_absurd_numbers(
     now: float | None, tmp_path: Path, capsys: pytest.CaptureFixture[str]
@@ -444,6 +446,7 @@ def test_a_damaged_log_is_exported_as_far_as_it_goes(
     assert Path("bad.csv").read_text().count("\n") == 3
 
 
+@pytest.mark.ci
 def test_G7_logs_of_trials_are_replayed_to_the_bit(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

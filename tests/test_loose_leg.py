@@ -178,6 +178,7 @@ class Paused:
             session.orders.arm = len(self.loose) != 50
 
 
+@pytest.mark.ci
 def test_B10_after_a_pause_a_loose_leg_waits_for_an_arm_event() -> None:
     story = Paused(5.0)
     assert Cause.PAUSE in story.causes

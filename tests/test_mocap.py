@@ -101,6 +101,7 @@ def read(log: Path, tmp_path: Path, text: str, name: str = "table.csv", **how: A
     return poses_of(log, table, **how)
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("drift", [0.0, 50e-6, 0.01])
 def test_offset_and_drift_are_within_their_intervals(drift: float) -> None:
     """The 95 % interval holds the truth in 57 of 60 draws, but for chance: 54 (2 sigma)."""

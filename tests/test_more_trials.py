@@ -118,6 +118,7 @@ def test_a_run_that_was_killed_as_it_took_more_goes_on(cut: int) -> None:
     assert same("run", "once")
 
 
+@pytest.mark.ci
 def test_from_python_it_goes_on_as_well() -> None:
     settings = {"controllers": ["open"], "scene": "flat", "time_limit": 0.2}
     antennate.run("tunnel", trials=1, out="run", **settings)

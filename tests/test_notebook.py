@@ -78,6 +78,7 @@ def test_a_data_frame_has_the_columns_of_the_table(tunnel: antennate.Result) -> 
         assert series["force_mean_n"] == row.force_mean_n
 
 
+@pytest.mark.ci
 def test_a_run_directory_is_written_and_read(tmp_path: Path) -> None:
     place = tmp_path / "mine"
     result = antennate.run("tunnel", out=place, controllers=("open",), **SHORT)

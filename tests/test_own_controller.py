@@ -277,6 +277,7 @@ def test_the_example_runs_in_the_tunnel_in_worker_processes(
     assert "OwnController" in capsys.readouterr().out
 
 
+@pytest.mark.ci
 def test_the_example_drives_the_twin() -> None:
     """By the code of `drive`, all of it through bytes, in lock-step."""
     driven = Driven(EXAMPLE)

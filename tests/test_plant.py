@@ -265,6 +265,7 @@ def test_exports_hold_delay_play_and_friction() -> None:
     assert float(limit.get("upper", 0)) == pytest.approx(DEGREE / 2)
 
 
+@pytest.mark.ci
 def test_a_trial_runs_with_all_of_it(tmp_path: Path) -> None:
     file = tmp_path / "mine.toml"
     file.write_text(

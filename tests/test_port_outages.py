@@ -130,6 +130,7 @@ def pulled(how: str) -> Callable[[Story, float], None]:
     return act
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("how", ["usb", "servos"])
 def test_B6_L12_a_bus_put_back_stands_until_an_arm_event_and_begins_where_the_servos_are(
     how: str,

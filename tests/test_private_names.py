@@ -102,6 +102,7 @@ def test_a_name_of_its_own_is_none(text: str) -> None:
     assert not list(used(ast.parse(text), {"_hidden"}))
 
 
+@pytest.mark.ci
 def test_tests_use_no_private_name_of_the_package() -> None:
     package = of_the_package()
     assert [

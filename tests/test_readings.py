@@ -123,6 +123,7 @@ def test_yoked_trials_get_the_readings_of_the_next_one(
         assert error.count("\n") == 1
 
 
+@pytest.mark.ci
 def test_rows_do_not_depend_on_the_batch() -> None:
     config = TunnelConfig(seed=3, trials=4, time_limit=2.0, control=ControlParams(rate=50.0))
     tables: list[dict[int, Any]] = []

@@ -132,6 +132,7 @@ def test_a_drive_that_finds_no_robot_costs_no_old_run(capsys: pytest.CaptureFixt
 SPRINGS = ["antenna", "--no-figures"]
 
 
+@pytest.mark.ci
 def test_the_old_run_is_whole_in_a_folder_beside_the_new_one(tmp_path: Path) -> None:
     replaced = ["run.old", "run.old2", "run.old3"]
     for words in (SPRINGS, ["robot"], WALL):

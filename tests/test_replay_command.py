@@ -119,6 +119,7 @@ def test_replay_export_and_plot_count_time_as_the_loop_did(
     assert times[0] >= 5.0
 
 
+@pytest.mark.ci
 def test_it_leaves_a_table_and_a_figure(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """The table holds what the log holds, to the last digit."""
     live = session(tmp_path, "closed", 1, blind=130)

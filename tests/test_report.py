@@ -181,6 +181,7 @@ def test_a_link_is_written_through() -> None:
     assert Path("page.html").read_bytes() == Path("run/report.html").read_bytes()
 
 
+@pytest.mark.ci
 def test_python_and_commands_of_the_robot_leave_one() -> None:
     antennate.run("antenna", out="antenna")
     page = Page(Path("antenna/report.html"))
@@ -220,6 +221,7 @@ def test_the_claims_of_the_paper_stand_in_theirs(capsys: pytest.CaptureFixture[s
     assert "Over half of the trials jam" in page.text
 
 
+@pytest.mark.ci
 def test_two_runs_stand_side_by_side(run: Path, refused: Callable[..., str]) -> None:
     run.rename("coil-4")
     assert main(["antenna", "--coil-mm", "3.6", "--out", "coil-3.6"]) == 0

@@ -102,6 +102,7 @@ def test_the_quick_antenna_recovers_as_a_cockroach_does() -> None:
         assert result.engine.cycle_s == pytest.approx(0.050, rel=0.1)
 
 
+@pytest.mark.ci
 def test_the_command_takes_the_quick_antenna_and_says_how_it_recovers(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -114,6 +115,7 @@ def test_the_command_takes_the_quick_antenna_and_says_how_it_recovers(
     assert "one cycle [ms] 412 411" in said  # 1 / 2.431 Hz
 
 
+@pytest.mark.ci
 def test_the_quick_antenna_stands_beside_the_default_one(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

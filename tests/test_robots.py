@@ -71,6 +71,7 @@ def test_a_robot_of_any_size_is_driven_as_in_simulation(robot: RobotSpec) -> Non
     assert one.walk.readings == other.readings
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize(("links", "hinges"), SIZES)
 def test_a_robot_of_any_size_goes_through_the_commands(
     links: int, hinges: int, tmp_path: Path, capsys: pytest.CaptureFixture[str]

@@ -121,6 +121,7 @@ def imported(file: Path) -> Iterator[str]:
             nodes += ast.iter_child_nodes(node)
 
 
+@pytest.mark.ci
 def test_imports_go_down_in_the_drawing_of_the_rooms() -> None:
     """That of CONTRIBUTING.md, from top to bottom; the two lowest import none of ours."""
     drawn = re.findall(r"^packages/([\w-]+)/", (ROOT / "CONTRIBUTING.md").read_text(), re.MULTILINE)

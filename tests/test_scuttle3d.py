@@ -122,6 +122,7 @@ def faulty(fault: str, duration: float = 3.0, **limits: object) -> Report:
     )
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("name", ["pitch1", "pitch5", "antenna_l_elevation"])
 def test_a_silent_servo_of_the_new_joints_ends_in_a_fault_that_names_it(name: str) -> None:
     servo = ROBOT.ids[ROBOT.joint_names.index(name)]

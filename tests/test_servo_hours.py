@@ -68,6 +68,7 @@ def hold_up(cycles: int, loss: float) -> tuple[int, int]:
     return worst, rig.bus.tally.misses
 
 
+@pytest.mark.ci
 def test_B2_a_lost_answer_in_a_hundred_never_holds_the_robot() -> None:
     worst, misses = hold_up(1000, 0.01)
     assert worst <= 3

@@ -670,6 +670,7 @@ def test_B13_a_sagging_supply_warns_then_holds_then_switches_off() -> None:
     assert not any(servo.get("hardware_error_status") for servo in log.rig.robot.servos)
 
 
+@pytest.mark.ci
 def test_B13_below_the_first_level_it_walks_at_half_the_pace_and_replays_alike() -> None:
     """The gait turns each leg 0.4 times in 1 s."""
     ticks = list[Tick]()

@@ -53,6 +53,7 @@ TURN = 4096
 ROBOT = RobotSpec()
 
 
+@pytest.mark.ci
 def test_each_walk_of_the_gait_leaves_a_log(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -117,6 +117,7 @@ def test_left_and_right_are_alike() -> None:
     np.testing.assert_allclose(right, -left, atol=1e-9)
 
 
+@pytest.mark.ci
 def test_follow_stays_at_the_wall_that_open_leaves() -> None:
     """An antenna reaches 0.14 m beside the robot; both walls are on the right."""
     settings: dict[str, Any] = {"scene": "wall", "seed": 600_000}

@@ -36,6 +36,7 @@ def triples() -> list[tuple[Cause, ...]]:
     return [every[k] for k in rng.choice(len(every), 500, replace=False).tolist()]
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("groups", [pairs(), triples()], ids=["pairs", "triples"])
 def test_T8_the_most_severe_wins_and_nothing_flutters(groups: list[tuple[Cause, ...]]) -> None:
     for group in groups:

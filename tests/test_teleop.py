@@ -94,6 +94,7 @@ def test_the_antennae_oscillate_until_told_again_and_stay_where_they_are() -> No
     assert np.diff(angles[:50]).max() < 0.35 * math.pi * 0.01 * 1.01
 
 
+@pytest.mark.ci
 def test_keys_walk_the_twin_and_q_ends_it_with_the_torque_off() -> None:
     made = rig(TwinConfig())
     begin = made.clock.now()

@@ -59,6 +59,7 @@ class Counting:
         return self._port.drain()
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("count", ROBOTS)
 def test_a_walk_before_the_twin_puts_no_more_on_the_wire(count: int) -> None:
     """But for two more questions of two bytes in single ticks, as for the voltage once a round."""

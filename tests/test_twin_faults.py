@@ -108,6 +108,7 @@ class Truth:
                 self.goals[params[at]].add(goal)
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize(("ber", "worst"), [("1e-4", State.HOLD), ("1e-3", State.FAULT)])
 def test_L1_B3_bit_errors_are_counted_and_no_wrong_value_is_ever_used(
     ber: str, worst: State

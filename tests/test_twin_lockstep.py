@@ -9,6 +9,7 @@ import time
 import tty
 
 import numpy as np
+import pytest
 from lockstep import BoardPort, LockstepClock
 
 from antennate.hardware.esp32.wire import FrameDecoder, Sample
@@ -106,6 +107,7 @@ class Client:
         return came
 
 
+@pytest.mark.ci
 def test_a_slow_client_gets_what_invented_time_gives() -> None:
     expected, chance = in_invented_time(), random.Random(3)
     with Client() as client:

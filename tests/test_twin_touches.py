@@ -93,6 +93,7 @@ def test_other_orders_are_refused(text: str) -> None:
         TouchStimulus([], ANTENNA).order("left@1s")
 
 
+@pytest.mark.ci
 def test_one_twin_serves_many_drives_each_with_its_touches_from_the_same_start() -> None:
     config = TwinConfig(touch=("left@1s", "right@3s"))
     made = rig(config, touch=TouchCheckParams())

@@ -236,11 +236,14 @@ def test_twin_with_joints_repaired_wrongly_is_told_from_one_that_nobody_touched(
         assert wrong["yaw1"]["grade"] == "warn"
         assert "backlash not as fitted" in wrong["yaw1"]["cure"]
         assert 1.0 < numbers_of(wrong["yaw1"]["found"])["backlash"] < 3.0
-        assert wrong["leg_r2"]["grade"] != "warn"  # a busy computer may leave its friction untold
+        assert (
+            "gain" not in wrong["leg_r2"]["cure"]
+        )  # its friction may be untold, and its lag longer
         assert numbers_of(wrong["leg_r2"]["found"])["gain"] == pytest.approx(1.0, abs=0.1)
         twin.order("fault servo:8=position_p_gain:700")
         right = twin.rows("right", file)
-        assert right["leg_l1"]["grade"] != "warn"
+        # The twin's servos move once a control period: their lag depends on how its clock stands.
+        assert "gain" not in right["leg_l1"]["cure"]
         assert numbers_of(right["leg_l1"]["found"])["gain"] == pytest.approx(1.0, abs=0.1)
     finally:
         twin.process.kill()

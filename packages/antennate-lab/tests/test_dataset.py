@@ -133,6 +133,7 @@ def test_labels_are_never_inputs_and_inputs_are_what_a_robot_reads() -> None:
         assert labels == {task.label for task in TASKS if task.kind == kind}
 
 
+@pytest.mark.ci
 def test_estimates_do_not_see_labels_of_tests_nor_truth(outcome: Any) -> None:
     """Estimates stay when all that a robot does not have is changed where nothing is learned."""
     config = outcome.config
@@ -172,6 +173,7 @@ def test_without_noise_the_closed_form_tells_a_gap() -> None:
         assert guess == pytest.approx(windows["gap_m"], rel=0.002)
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("depth", [0.1, 0.2])
 @pytest.mark.parametrize("place", [0.08, 0.1])
 def test_without_noise_the_closed_form_tells_the_place(place: float, depth: float) -> None:
@@ -217,6 +219,7 @@ def test_the_pose_of_the_head_is_that_of_the_engine() -> None:
     assert y == pytest.approx(off @ [-math.sin(axis), math.cos(axis)], abs=1e-6)
 
 
+@pytest.mark.ci
 def test_walls_on_both_sides_are_walked_and_told_apart() -> None:
     config = DatasetConfig.model_validate({"walk": {"distance": [0.14, 0.17], "angle": [0.1, 0.2]}})
     sides = set()

@@ -182,6 +182,7 @@ def test_rows_become_the_result_that_the_tables_show():
     assert cells["body lengths a cycle"] == ["0.50", "0.62", "1.25", "0.75"]
 
 
+@pytest.mark.ci
 def test_a_row_keeps_what_was_planned():
     few = {"gaits": 3, "wave_numbers": (1.0,), "leads": 5, "front_waves": 1, "repeats": 1}
     config = GeometryConfig(cycles=2, settling_cycles=0, turns=0, **few)

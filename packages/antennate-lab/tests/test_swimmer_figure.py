@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import pytest
+
 from antennate.figures import render
 from antennate_lab.swimmers import swimmer_figure
 from geometric_locomotion.chain import purcell
 from geometric_locomotion.maps import curvature_map
 
 
+@pytest.mark.ci
 def test_the_figure_shows_both_frames_and_both_strokes() -> None:
     figure = swimmer_figure(curvature_map(purcell(), count=5))
     first, second, sizes, bar = figure.axes[0], figure.axes[1], figure.axes[-1], figure.axes[2]
