@@ -139,6 +139,7 @@ def test_lag_is_the_shift_of_a_sine() -> None:
     assert measures.turn(course) == pytest.approx(0.5, rel=1e-6)
 
 
+@pytest.mark.ci
 def test_regression_knows_what_a_linear_model_tells() -> None:
     """Of two numbers one is seen through noise of 0.1 in each of 25 features, one not at all."""
     rng = np.random.default_rng(5)
@@ -154,6 +155,33 @@ def test_regression_knows_what_a_linear_model_tells() -> None:
     assert told.sd[0] == pytest.approx(sure, rel=0.3)
     assert told.mean[1] == pytest.approx(0.0, abs=0.2)
     assert told.sd[1] == pytest.approx(1.0, rel=0.15)
+
+
+@pytest.mark.parametrize("change", [0.0, 0.3])
+def test_walks_of_a_robot_that_changes_contradict_one_another(change: float) -> None:
+    """Six walks tell two numbers; with noise alone, or with numbers that change on the way."""
+    rng = np.random.default_rng(7)
+    seen = 20.0 * rng.standard_normal((6, 2, 30))
+    places = rng.standard_normal((120, 2))
+    walks = [places @ each + rng.standard_normal((120, 30)) for each in seen]
+    own = np.array([0.4, -0.6]) + change * rng.standard_normal((6, 2))
+    measured = [x @ each + rng.standard_normal(30) for x, each in zip(own, seen, strict=True)]
+    assert (regression.contrary(places, walks, measured) > regression.CONTRARY) == (change > 0.0)
+
+
+def test_friction_that_wanders_changes_a_walk_and_no_step_in_the_air() -> None:
+    """Legs slip otherwise with another seed; hanging they touch nothing."""
+    goals = np.zeros((120, 5))
+    goals[:, 1:] = np.linspace(0.0, 6.0, 120)[:, None]
+    none = np.zeros((120, 0))
+    for hook in (None, HookParams()):
+        course = Course("walk", hook, 0.01, 1.0, goals, goals, none, none)
+        made = [
+            simulated(SMALL, course, wander=0.6, seed=(seed,)).positions.tolist()
+            for seed in (1, 1, 2)
+        ]
+        assert made[0] == made[1]
+        assert (made[0] == made[2]) == (hook is not None)
 
 
 def test_friction_of_a_leg_is_the_common_one_times_its_own() -> None:

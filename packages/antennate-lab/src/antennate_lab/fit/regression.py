@@ -6,6 +6,10 @@ felt, linearly with a ridge (approximate Bayesian computation with regression ad
 Zhang and Balding, Genetics 162, 2002). What the regression misses of robots that it did not see is
 the standard deviation, so that a parameter that the steps do not tell keeps what was known before.
 A second round draws about what the first has found.
+
+Each walk tells the parameters, too. Where walks contradict one another more than those of nearly
+all simulated robots (by the jackknife), the friction of the legs is taken to change on the way, as
+on a dusty floor: the robots of the second round have legs whose friction wanders.
 """
 
 from __future__ import annotations
@@ -39,6 +43,12 @@ ARM = 0.01
 """Standard deviation of what the middle of the markers is off that of the head [m] (assumed)."""
 SHARE = 0.1
 """What speed and turn by motion capture count, over all else that is felt in a walk."""
+CONTRARY = 0.95
+"""Share of the simulated robots whose walks contradict one another less, beyond which friction is
+taken to wander."""
+WANDER = 0.6
+"""Largest standard deviation of the logarithm of a friction that wanders (assumed: twice that of
+`variation.slip_log_sd`, whose `slip_time` it has)."""
 _FARTHEST = 3.5
 """A parameter is not told if the regression goes farther from what was known before [standard
 deviations]: no robot that was drawn felt the like."""
@@ -102,22 +112,26 @@ def felt(course: Course, unit: Floats = LEAST) -> Floats:
     return np.concatenate([own, *[seen] * max(1, round(SHARE * len(own) / max(len(seen), 1)))])
 
 
-def _felt_of(robot: RobotSpec, courses: Sequence[Course], unit: Floats, seed: int) -> Floats:
-    """What a simulated robot feels in all courses; NaN where the simulation fails.
+def _felt_of(
+    robot: RobotSpec, courses: Sequence[Course], unit: Floats, seed: int, wander: float
+) -> list[Floats]:
+    """What a simulated robot feels in each course; NaN where the simulation fails.
 
     Each walk begins a little off the posture that was measured, and the markers sit a little off
-    the middle of the head, so that chance counts as noise.
+    the middle of the head, so that chance counts as noise. The friction of its legs wanders with
+    a standard deviation of `wander` in its logarithm.
     """
     rng, parts = np.random.default_rng(seed), []
     arm = ARM * np.random.default_rng([seed, 1]).standard_normal(2)
-    for course in courses:
+    for number, course in enumerate(courses):
         off = POSTURE * rng.standard_normal(course.positions.shape[1])
         begin = replace(course, positions=course.positions + off)
         try:
-            parts.append(felt(_marked(simulated(robot, begin), arm), unit))
+            made = simulated(robot, begin, wander=wander, seed=(seed, 2, number))
+            parts.append(felt(_marked(made, arm), unit))
         except SimulationError:
             parts.append(np.full_like(felt(course, unit), np.nan))
-    return np.concatenate(parts)
+    return parts
 
 
 def _marked(course: Course, arm: Floats) -> Course:
@@ -137,11 +151,13 @@ class Told:
     Attributes:
         mean, sd: Of each, shape (P,).
         correlation: Of what the regression misses, shape (P, P).
+        wanders: Whether friction is taken to change on the way.
     """
 
     mean: Floats
     sd: Floats
     correlation: Floats
+    wanders: bool = False
 
 
 def regressed(
@@ -156,8 +172,13 @@ def regressed(
         proposal: Distribution that they were drawn from.
         prior: What was known before.
     """
-    sound = np.isfinite(features).all(axis=1)
-    places, features = places[sound], features[sound]
+    found, missed = _fitted(places, features, measured)
+    told = Told(found, missed.std(axis=0), np.atleast_2d(np.corrcoef(missed.T)))
+    return _corrected(told, proposal, prior)
+
+
+def _fitted(places: Floats, features: Floats, measured: Floats) -> tuple[Floats, Floats]:
+    """What a regression finds, shape (P,), and what it misses of each robot, shape (N, P)."""
     scale = np.hypot(features.std(axis=0), 1.0)
     centre = features.mean(axis=0)
     rows, new = (features - centre) / scale, (measured - centre) / scale
@@ -176,8 +197,31 @@ def regressed(
             fits.append((float((away**2).mean()), ridge, away))
         _, ridge, missed[:, p] = min(fits, key=lambda fit: fit[0])
         found[p] = middle[p] + own @ (aim[:, p] / (size + ridge))
-    sd = missed.std(axis=0)
-    return _corrected(Told(found, sd, np.atleast_2d(np.corrcoef(missed.T))), proposal, prior)
+    return found, missed
+
+
+def contrary(places: Floats, walks: Sequence[Floats], measured: Sequence[Floats]) -> float:
+    """Share of the robots whose walks contradict one another less than those that were measured.
+
+    Each walk in turn is left out. How much the others then say otherwise, by the jackknife's
+    variance, is a mean over the parameters.
+
+    Args:
+        places: Parameters of the robots that were drawn, shape (N, P).
+        walks: What they felt in each walk, shape (N, F) each.
+        measured: What the robot felt in each, shape (F,) each.
+    """
+    if len(walks) < 3:  # two that differ do not say which is wrong, nor by how much
+        return 0.0
+    found, missed = [], []
+    for out in range(len(walks)):
+        rest = [k for k in range(len(walks)) if k != out]
+        features = np.concatenate([walks[k] for k in rest], axis=1)
+        one = _fitted(places, features, np.concatenate([measured[k] for k in rest]))
+        found.append(one[0])
+        missed.append(one[1])
+    own = np.var(found, axis=0).mean()
+    return float((np.var(missed, axis=0).mean(axis=1) < own).mean())
 
 
 def _corrected(told: Told, proposal: Known, prior: Known) -> Told:
@@ -221,20 +265,29 @@ def search(
         on_step: Told of each robot, of both rounds.
     """
     unit = scatter(courses)
-    measured = np.concatenate([felt(course, unit) for course in courses])
+    measured = [felt(course, unit) for course in courses]
     proposal, told = prior, Told(prior.mean, prior.sd, np.eye(len(prior.mean)))
+    wanders = False
     for number in range(2):
         places = np.clip(proposal.draw(count, rng), *bounds(chosen))
-        tasks = [(made(place), courses, unit, seed) for seed, place in enumerate(places)]
+        slips = rng.uniform(0.0, WANDER, count) if wanders else np.zeros(count)
+        pairs = zip(places, slips.tolist(), strict=True)
+        tasks = [(made(x), courses, unit, seed, slip) for seed, (x, slip) in enumerate(pairs)]
         features = gather(
             _felt_of,
             tasks,
             workers,
             lambda done, _, number=number: on_step(number * count + done, 2 * count),
         )
-        told = regressed(places, np.array(features), measured, proposal, prior)
+        walks = [np.array(walk) for walk in zip(*features, strict=True)]
+        sound = np.isfinite(np.concatenate(walks, axis=1)).all(axis=1)
+        places, walks = places[sound], [walk[sound] for walk in walks]
+        whole = np.concatenate(walks, axis=1)
+        told = regressed(places, whole, np.concatenate(measured), proposal, prior)
+        if number == 0:
+            wanders = contrary(places, walks, measured) >= CONTRARY
         proposal = Known(told.mean, np.minimum(WIDER * told.sd, prior.sd))
-    return told
+    return replace(told, wanders=wanders)
 
 
 def is_walk(course: Course) -> bool:

@@ -7,7 +7,7 @@ wrong before counts.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -64,7 +64,11 @@ class Course:
 
 
 def simulated(
-    robot: RobotSpec, course: Course, look: Callable[[World], object] = lambda world: None
+    robot: RobotSpec,
+    course: Course,
+    look: Callable[[World], object] = lambda world: None,
+    wander: float = 0.0,
+    seed: Sequence[int] = (0,),
 ) -> Course:
     """What the simulation of a robot makes of the commands of a course.
 
@@ -72,6 +76,8 @@ def simulated(
         robot: The robot.
         course: Its commands, and the posture in which it begins.
         look: Called with the world at each tick of the course.
+        wander: Standard deviation of the logarithm of the friction of legs that wanders.
+        seed: Of how it wanders.
 
     Raises:
         SimulationError: The robot falls over or flies apart.
@@ -79,7 +85,9 @@ def simulated(
     robot = _silent(robot)
     world = world_of(robot, course.hook, course.positions[0])
     sim = SimRobot(1, robot, course.period, PHYSICS.timestep)
-    sim.load(0, world, Disturbance(np.random.default_rng(0), _CALM, robot, course.period))
+    variation = _CALM.model_copy(update={"slip_log_sd": wander})
+    chance = Disturbance(np.random.default_rng(list(seed)), variation, robot, course.period)
+    sim.load(0, world, chance)
     before = round(SETTLING / course.period)
     places: list[tuple[float, float, float]] = []
     felt, rows = [], np.concatenate([course.commands[:1]] * before + [course.commands])
