@@ -8,7 +8,7 @@ The criterion, before the run: of the numbers that are told, 80 to 98 % have the
 90 % interval; on steps that were left out, speed and turn in a cycle and lag are predicted within
 5 % or twice the repeatability. Two seeds are judged, each once: 60601 on robots without errors of
 their zeros, whose legs always slip alike, and 60602 on robots with both as the twin has them
-(`VariationParams`), after `fit` had learnt of them. While `fit` was made, others were used.
+(`VariationParams`), after `fit` had learnt of the latter. While `fit` was made, others were used.
 
 FOLDER/numbers.csv has a row for each parameter of each robot, FOLDER/steps.csv one for each measure
 of each step that was left out. Robots that are in the folder are not made anew.
