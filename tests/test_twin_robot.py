@@ -21,8 +21,9 @@ from antennate.hardware.joints import CommandError, Joints
 from antennate.params.control import ControlParams
 from antennate.robots.spec import RobotSpec
 from antennate.sim.scenes.tunnel import TunnelScene
+from antennate.sim.trial import draw_trial, scene_of
 from antennate.sim.world import World
-from antennate.twin.config import Passage
+from antennate.twin.config import Passage, TwinConfig, watched
 from antennate.types import AntennaFrame, JointCommand, Maneuver
 
 ROBOT = RobotSpec()
@@ -178,6 +179,29 @@ def test_a_whole_trial_through_bytes_is_decided_like_the_pure_simulation(
     assert pure.status == end
     assert len({Maneuver.FORWARD, Maneuver.REVERSE} & set(pure.maneuvers)) == 2
     assert twin == pure
+
+
+def test_a_servo_of_the_twin_tells_angles_about_its_own_zero() -> None:
+    """It comes to its goal whatever its zero is off; the joint then is off by so much."""
+    config = TwinConfig(scene="flat")
+    control = config.control
+    drawn = draw_trial(config, scene_of(config), config.trial, control.gait, control.period)
+    bias = drawn.chance.joint_bias
+    assert min(map(abs, bias)) > 1e-4
+    twin, _ = watched(config)
+    joints = Joints(config.robot)
+    goals = joints.ticks(command(yaw=0.2))
+    for at_rest in (True, False):
+        if not at_rest:
+            for servo, goal in zip(twin.servos, np.asarray(goals).tolist(), strict=True):
+                servo.set("torque_enable", 1)
+                servo.set("goal_position", goal)
+            twin.advance(2.0)
+        told = joints.angles(np.array([servo.motion.shaft.position for servo in twin.servos]))
+        off = twin.world.drives() - told
+        assert off[:5] == pytest.approx(bias, abs=1e-9)
+        assert off[5:] == pytest.approx(0.0, abs=1e-9)
+    assert told[:5] == pytest.approx(0.2, abs=0.02)
 
 
 def test_the_twin_tells_when_its_head_passes_the_exit() -> None:

@@ -192,24 +192,6 @@ def test_friction_of_a_leg_is_the_common_one_times_its_own() -> None:
     assert robot.legs.friction_factors == (1.0, 1.0, 0.5, 1.0)
 
 
-def test_error_of_the_zero_of_a_yaw_joint_is_taken_out(tmp_path: Path) -> None:
-    """It rests 0.03 rad off its goal, here exactly; a leg that does so may carry a weight."""
-
-    def measured(step: Step, goals: Floats) -> Floats:
-        off = np.zeros(len(robot.joint_names))
-        off[[0, robot.joint_names.index("leg_r0")]] = 0.03
-        return goals + off
-
-    robot = RobotSpec(links=2)
-    protocol = sweeps(robot, "leg_l0", "leg_l1").made_for(robot, CONTROL)
-    log = write(tmp_path / "zero.mcap", robot, protocol, measured)
-    leg = robot.joint_names.index("leg_r0")
-    for course in recording.read(log, robot).courses:
-        apart = course.positions - course.commands
-        assert abs(apart[:, 0]).max() < 1e-9
-        assert apart[:, leg] == pytest.approx(0.03)
-
-
 def test_leg_beyond_what_a_robot_may_have_is_not_told() -> None:
     """Three times the friction that all share; a robot's file allows twice."""
     robot = RobotSpec(links=2)

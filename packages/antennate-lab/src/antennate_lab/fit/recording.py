@@ -115,11 +115,8 @@ def read(path: Path, robot: RobotSpec, seen: tuple[str, Poses] | None = None) ->
             f"{len(missing)} of {len(planned)} steps of the protocol are missing, from "
             f"{missing[0]} on; give the folder to `drive --protocol` again to record them"
         )
-    zero, offsets = _gyro_zero(courses), _yaw_offsets(robot, courses)
-    courses = [
-        replace(course, gyro=course.gyro - zero, commands=course.commands + offsets)
-        for course in courses
-    ]
+    zero = _gyro_zero(courses)
+    courses = [replace(course, gyro=course.gyro - zero) for course in courses]
     return Recording(path.stem, log_hash(path), courses, zero, left_out, warnings)
 
 
@@ -153,22 +150,6 @@ def _odd_joints(robot: RobotSpec, courses: list[Course]) -> list[str]:
             if abs(lag - usual) > (ODD - 1.0) * abs(min(lag, usual)) + _MUCH
         ]
     return told
-
-
-def _yaw_offsets(robot: RobotSpec, courses: list[Course]) -> Floats:
-    """How far yaw joints rest off their goals in the air, errors of their zeros [rad], (joints,).
-
-    Nothing loads them there. Others count as at their goals, for a weight may pull them off.
-    """
-    offsets = np.zeros(len(robot.joint_names))
-    for joint in range(robot.yaw_count):
-        rests = [
-            float(np.median(course.positions[:, joint] - course.commands[:, joint]))
-            for course in courses
-            if course.hanging and joint not in moving(course)
-        ]
-        offsets[joint] = np.median(rests) if rests else 0.0
-    return offsets
 
 
 def _gyro_zero(courses: list[Course]) -> Floats:

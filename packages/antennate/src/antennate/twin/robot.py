@@ -97,6 +97,8 @@ class TwinRobot:
         self.command = self._joints.command(np.array(robot.zeros, float))
         self._sign: Floats = np.array(robot.directions, float)
         self._stall: Floats = np.array([servo.stall_torque for servo in robot.joint_servos])
+        self._bias: Floats = np.zeros(len(robot.joint_names))
+        self._bias[: robot.yaw_count] = body.joint_bias(0)
         self._period = period
         self._encoder = frame.SampleEncoder(boot_id, robot.has_imu)
         self._boot_id = boot_id
@@ -274,26 +276,28 @@ class TwinRobot:
             self.servos[place].push(ticks)
         if moved and self._standing:
             ticks = np.array([servo.motion.shaft.position for servo in self.servos])
-            self._body.world(0).place_drives(self._joints.angles(ticks))
+            self._body.world(0).place_drives(self._joints.angles(ticks) + self._bias)
 
     def _carry_back(self) -> None:
         """Put the robot where the trial began, as a person does between two drives."""
         self._body.put_back(0, self._start)
         self.hands.clear()
         self._standing = True
-        for servo, ticks in zip(
-            self.servos, self._joints.positions(self._body.world(0).drives()).tolist(), strict=True
-        ):
+        for servo, ticks in zip(self.servos, self._positions().tolist(), strict=True):
             servo.carry(ticks)
         self._read()
         self.on_return()
+
+    def _positions(self) -> Floats:
+        """Positions of the shafts, about their own zeros [ticks], shape (n,)."""
+        return self._joints.positions(self._body.world(0).drives() - self._bias)
 
     def _shafts(self) -> Floats:
         """Positions [ticks], speeds [ticks/s] and shares of the full drive, shape (3, n)."""
         world = self._body.world(0)
         return np.stack(
             [
-                self._joints.positions(world.drives()),
+                self._positions(),
                 self._sign * world.drive_speeds() / POSITION_UNIT,
                 self._sign * world.drive_torques() / self._stall,
             ]
