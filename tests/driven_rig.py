@@ -245,7 +245,9 @@ class _Begun:
         self._ahead = float(start.first.t[0]) - start.standing * period
         self.sent: tuple[int, ...] = ()
         self._frame: AntennaFrame | None = self._stamped(body.read())
-        stood = np.rint(self._joints.positions(body.world(0).drives()))
+        angles = body.world(0).drives()
+        bias = np.pad(body.joint_bias(0), (0, len(angles) - robot.yaw_count))
+        stood = np.rint(self._joints.positions(angles - bias))
         for tick in range(start.standing):
             self._send(stood)
             body.sleep_until((tick + 1) * period)

@@ -83,7 +83,10 @@ class Rounded:
 
 
 class Watch:
-    """The monitor of a trial, and what was decided."""
+    """The monitor of a trial, and what was decided.
+
+    The robot was put where its servos tell the start of the gait, whatever their zeros are off.
+    """
 
     def __init__(self, config: TunnelConfig, name: str, trial: int) -> None:
         period = config.control.period
@@ -91,6 +94,9 @@ class Watch:
         start = draw_trial(config, scene, trial, config.control.gait, period)
         self.body = SimRobot(1, config.robot, period, config.physics.timestep)
         self.body.load(0, start.world, start.chance)
+        angles = start.world.drives()
+        bias = np.pad(start.chance.joint_bias, (0, len(angles) - config.robot.yaw_count))
+        start.world.place_drives(angles + bias)  # its servos tell the start of the gait
         self.controller = make_controller(name, config.control, config.robot)
         self.controller.reset(np.array([0]), start.phase)
         self._monitor = TrialMonitor(start.episode(config.time_limit), name)

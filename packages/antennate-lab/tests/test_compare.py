@@ -73,6 +73,12 @@ def numbers_of(words: str) -> dict[str, float]:
     return {name: float(word.rstrip("°")) for name, word, *_ in parts if word != "not"}
 
 
+def out_of_range(row: dict[str, str]) -> set[str]:
+    """Names of the numbers of a row that are not as fitted."""
+    names, found, _ = row["cure"].partition(" not as fitted")
+    return set(names.split(" and ")) if found else set()
+
+
 def test_joint_that_nobody_touched_is_as_fitted(tmp_path: Path) -> None:
     row = compared(tmp_path)
     assert row.grade == "ok", row
@@ -236,14 +242,12 @@ def test_twin_with_joints_repaired_wrongly_is_told_from_one_that_nobody_touched(
         assert wrong["yaw1"]["grade"] == "warn"
         assert "backlash not as fitted" in wrong["yaw1"]["cure"]
         assert 1.0 < numbers_of(wrong["yaw1"]["found"])["backlash"] < 3.0
-        assert (
-            "gain" not in wrong["leg_r2"]["cure"]
-        )  # its friction may be untold, and its lag longer
+        assert out_of_range(wrong["leg_r2"]) <= {"lag"}
         assert numbers_of(wrong["leg_r2"]["found"])["gain"] == pytest.approx(1.0, abs=0.1)
         twin.order("fault servo:8=position_p_gain:700")
         right = twin.rows("right", file)
-        # The twin's servos move once a control period: their lag depends on how its clock stands.
-        assert "gain" not in right["leg_l1"]["cure"]
+        # A lag of the twin is up to a control period more, as its clock happens to stand.
+        assert out_of_range(right["leg_l1"]) <= {"lag"}
         assert numbers_of(right["leg_l1"]["found"])["gain"] == pytest.approx(1.0, abs=0.1)
     finally:
         twin.process.kill()

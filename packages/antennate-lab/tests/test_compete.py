@@ -449,7 +449,6 @@ def test_a_run_tells_how_long_it_will_take_before_the_first_episode(
     assert told == "1600 episodes of 160,000 s together at most: 7 min to 2.2 h, 4 workers"
 
 
-@pytest.mark.ci
 @pytest.mark.smoke
 def test_a_row_is_that_of_tunnel() -> None:
     """The same scene, seed and trial, run by the command `tunnel` with those parameters."""
