@@ -20,7 +20,7 @@ from scipy import signal
 from antennate.control.protocol import Protocol, Step, targets
 from antennate.errors import BadInputError, LogError
 from antennate.hardware.config import RobotConfig
-from antennate.params.scene import HookParams
+from antennate.params.scene import HookParams, VariationParams
 from antennate.robots.spec import RobotSpec
 from antennate.studies.pool import Workers
 from antennate.types import Floats
@@ -506,6 +506,31 @@ def test_hidden_robot_is_found(tmp_path: Path) -> None:
     stiffness = found["antenna.three_coil_stiffness_n_mm_per_deg"].value
     truth = hidden.antenna.three_coil_stiffness_n_mm_per_deg
     assert stiffness == pytest.approx(truth, rel=0.05)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("wander", [0.0, 0.6])
+def test_friction_that_wanders_is_told_and_widens_the_intervals_of_legs(
+    tmp_path: Path, wander: float
+) -> None:
+    """Five walks of the default robot, whose legs slip alike or are drawn anew on the way."""
+    identified = _identified()
+    ways = ("FORWARD", "TURN_L", "TURN_R", "REVERSE", "FORWARD")
+    steps = tuple(
+        Step(name=f"walk-{at}", maneuver=way, frequency=0.5, seconds=6.0)
+        for at, way in enumerate(ways)
+    )
+    protocol = Protocol(steps=steps).made_for(identified.KNOWN, CONTROL)
+    chance = VariationParams(slip_log_sd=wander)
+    identified.record(identified.KNOWN, protocol, tmp_path / "drive.mcap", 3, variation=chance)
+    known = tmp_path / "known.toml"
+    known.write_text('[imu]\nkind = "head"\n', encoding="utf-8")
+    config = FitConfig(log=(str(tmp_path / "drive.mcap"),), robot=str(known), robots=60)
+    outcome = run(config, 2)
+    assert bool([text for text in outcome.warnings if "contradict" in text]) == (wander > 0.0)
+    legs = [row for row in outcome.rows if row.name.startswith("legs.friction_factors")]
+    width = np.median([row.high - row.low for row in legs])
+    assert (width > 0.5) == (wander > 0.0)
 
 
 def test_unknown_step_to_leave_out_is_refused(tmp_path: Path) -> None:
