@@ -142,6 +142,16 @@ def test_a_name_of_code_may_have_a_comma_in_its_path(
     assert "a,b.py" in refused("tunnel", "--controllers", f"{tmp_path}/a,b.py:C", "--trials=1")
 
 
+def test_a_number_of_a_controller_may_be_a_list_with_commas() -> None:
+    timed = "schedule+schedule.reverse_times=[2, 4, 6]+gait.frequency=0.7"
+    lists = [each for _, each in LISTS if each.flag == "--controllers"]
+    for each in lists:
+        assert read_words([each.flag, "open", timed], [each])[each.path] == ("open", timed)
+        with pytest.raises(ConfigError, match="separated by spaces"):
+            read_words([each.flag, f"{timed},open"], [each])
+    assert lists
+
+
 @pytest.mark.parametrize("how", ["--help", "--help-all"])
 def test_the_help_says_how_a_list_is_given(how: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["twin", how]) == 0

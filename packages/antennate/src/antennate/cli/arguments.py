@@ -6,6 +6,7 @@ many values they take; the models check the values, once.
 
 from __future__ import annotations
 
+import re
 import shlex
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
@@ -274,8 +275,9 @@ _WITH_COMMAS = frozenset({"FILE", "NAME=VALUE"})
 
 
 def _refuse_commas(option: Option, words: Sequence[str]) -> None:
-    """Refuse a list in one word."""
-    listed = [word for word in words if "," in word and "/" not in word]
+    """Refuse a list in one word, but that of a parameter, as NAME+PARAMETER=[1, 2]."""
+    bare = (re.sub(r"=\[[^][]*\]", "", word) for word in words)
+    listed = [word for word in bare if "," in word and "/" not in word]
     if not listed or option.metavar in _WITH_COMMAS or Path in option.kinds:
         return
     parts = [part.strip() for part in ",".join(words).split(",") if part.strip()]
