@@ -3,8 +3,8 @@
 Parts, one command each; what was stopped goes on with the same command:
 
 - `search`: each rule at each of PACES in the eight scenes of the board, 20 draws of seed 592000.
-- `judge`: each at the pace that the search gave it, 100 fresh draws of a hidden seed; beside them
-  `geometric` at its pace, told a side by TELLERS.
+- `judge`: each at the pace that the search gave it, 100 fresh draws, 20 each of PARTS hidden seeds;
+  beside them `geometric` at its pace, told a side by TELLERS.
 - `table`: the pace of each rule and how it was chosen, and the board of the judged run.
 
 Asked are the rules of the board that are near its top. `open` crosses 92 of 800 there, and `map`
@@ -49,10 +49,10 @@ from antennate_lab.compete.standings import standing
 
 PACES, USUAL = (0.6, 0.7, 0.8), 0.6
 """Frequencies of the gait that are tried, and the default, for which times were set [Hz]."""
-SEARCH, DRAWS, FRESH = 592_000, 20, 100
-"""Seed of the search, and draws of each scene of the search and of the judged run."""
+SEARCH, DRAWS, PARTS = 592_000, 20, 5
+"""Seed of the search, its draws of each scene and those of a part of the judged run, and parts."""
 BLIND, FEELS = ("timed", "schedule"), ("closed", "geometric")
-TELLERS = tuple(f"{Path(__file__).with_name('told.py')}:told_{auc}" for auc in (77, 65))
+TELLERS = ("docs/science/told.py:told_77", "docs/science/told.py:told_65")
 TIMES: Mapping[str, Sequence[str]] = {
     "timed": ("timed.walk_time", "escape.reverse_time", "escape.turn_time"),
     "schedule": ("schedule.walk_time", "schedule.reverse_times"),
@@ -88,15 +88,16 @@ def run(
     command += ["--controllers", *controllers, "--scenes", *SCENES_OF_BOARD]
     command += ["--hidden"] if seed is None else ["--seed", str(seed)]
     command += ["--trials", str(draws), "--workers", str(workers), "--no-figures"]
-    sys.exit(subprocess.run(command, check=False).returncode)
+    if code := subprocess.run(command, check=False).returncode:
+        sys.exit(code)
 
 
 def cells(rows: Iterable[EpisodeRow]) -> dict[str, tuple[Floats, Floats]]:
     """Whether each draw was crossed, and its share of the limit, by controller: (draws, scenes)."""
-    found: dict[str, dict[tuple[int, str], tuple[float, float]]] = {}
+    found: dict[str, dict[tuple[int, int, str], tuple[float, float]]] = {}
     for row in rows:
         draw = float(row.outcome == "success"), float(restricted([row])[0])
-        found.setdefault(row.controller, {})[row.trial, row.scene] = draw
+        found.setdefault(row.controller, {})[row.seed, row.trial, row.scene] = draw
     shape = -1, len(SCENES_OF_BOARD), 2
     return {
         name: (table[..., 0], table[..., 1])
@@ -163,9 +164,9 @@ def table(folder: Path) -> None:
         pace = name.partition("gait.frequency=")[2].partition("+")[0]
         count, time = f"{crossed.sum():.0f} of {crossed.size}", f"{100 * share.mean():.1f}"
         print(f"| `{plain(name)}` | {pace} | {count} | {time} | {'yes' * (name in best)} |")
-    if not (path := folder / "judged" / "trials.csv").exists():
+    rows = [row for path in sorted(folder.glob("judged-*/trials.csv")) for row in read_rows(path)]
+    if not rows:
         return
-    rows = read_rows(path)
     result = standing(rows, CompeteConfig().tie)
     print("", sentence(result), apart(result), markdown(result), sep="\n\n")
     print("", *compared(cells(rows)), sep="\n\n")
@@ -190,7 +191,8 @@ def main() -> None:
         best = chosen(cells(read_rows(given.folder / "search" / "trials.csv")))
         pace = best["geometric"].removeprefix("geometric")
         texts = [*best.values(), *(name + pace for name in TELLERS)]
-        run(given.folder / "judged", texts, None, given.draws or FRESH, given.workers)
+        for part in range(1, PARTS + 1):
+            run(given.folder / f"judged-{part}", texts, None, given.draws or DRAWS, given.workers)
 
 
 if __name__ == "__main__":

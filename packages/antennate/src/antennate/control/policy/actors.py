@@ -132,6 +132,17 @@ class ManeuverActor(_GaitRows):
 class GaitActor(_GaitRows):
     """Amplitude, yaw offset, frequency and direction of the serpenoid gait."""
 
+    def __init__(
+        self, interface: PolicyInterface, control: ControlParams, robot: RobotSpec, batch: int
+    ) -> None:
+        super().__init__(interface, control, robot, batch)
+        self._sweep: Floats = np.zeros(batch)
+
+    def reset(self, rows: Ints | Bools, phase: Floats | float = 0.0) -> None:
+        """Start rows anew at a gait phase [rad], straight, the antennae in the middle."""
+        super().reset(rows, phase)
+        self._sweep[rows] = 0.0
+
     def step(self, hold: Bools) -> JointCommand:
         """Joint targets of the gait asked for; a row that holds, or has a void answer, stays."""
         gait, period = self._control.gait, self._control.period
@@ -143,11 +154,13 @@ class GaitActor(_GaitRows):
         self._toward("amplitude", 0.5 * (amplitude + 1.0) * self._robot.yaw_limit, moves)
         self._toward("offset", offset * self._interface.turn_offset, moves)
         self.phase = self.phase + 2.0 * math.pi * period * self.pace
+        self._sweep = self._sweep + 2.0 * math.pi * period * gait.antenna_frequency * moves
         turn = np.where(offset > 0.0, int(Maneuver.TURN_R), int(Maneuver.TURN_L))
         ahead = np.where(np.abs(offset) > _STRAIGHT, turn, int(Maneuver.FORWARD))
         back = np.where(direction < 0.0, int(Maneuver.REVERSE), ahead)
         self.maneuver = np.where(moves, back, _HOLD)
-        return targets(gait, self._robot, self.phase, self.offset, amplitude=self.amplitude)
+        state = self.phase, self.offset, self._sweep
+        return targets(gait, self._robot, *state, amplitude=self.amplitude)
 
 
 class JointActor(_GaitRows):
