@@ -4,7 +4,8 @@
     antennate tunnel --controllers timed my_policy/policy.onnx --robot.legs.fastest 6.29
 
 It walks at 1 Hz, on a robot with faster legs than ours, which keeps up to 0.837 Hz: `--frequency
-0.8` teaches one that the legs keep, `--robot FILE` one with other antennae.
+0.8` teaches one that the legs keep, `--robot FILE` one with other antennae, `--swing 20` one whose
+antennae sweep by 20° to either side as it walks.
 Needs the extra `gym` and PyTorch (CPU), and the extra `onnx` to write the file.
 The teacher is the search of `geometric`, its ways and angles by a faster gait. The student learns
 on its own episodes (DAgger: Ross, Gordon and Bagnell 2011, arXiv:1011.0686): it walks, at first in
@@ -16,6 +17,7 @@ the teacher is told the side on which the way goes on, and the student learns to
 from __future__ import annotations
 
 import argparse
+import math
 import time
 from pathlib import Path
 
@@ -165,13 +167,22 @@ class Class:
         seed: Of the episodes.
         robot: The robot.
         frequency: Gait cycles a second [Hz].
+        swing: Amplitude of the sweep of the antenna bases [rad].
         told: Whether the teacher knows the side.
     """
 
     def __init__(
-        self, scene: str, readings: str, seed: int, robot: RobotSpec, frequency: float, told: bool
+        self,
+        scene: str,
+        readings: str,
+        seed: int,
+        robot: RobotSpec,
+        frequency: float,
+        swing: float,
+        told: bool,
     ) -> None:
         words = {"num_envs": ROWS, "interface": interface_of(frequency)}
+        words["control"] = {"gait": {"antenna_amplitude": swing}}
         self.envs = gym.make_vec(SCENES[scene], robot=robot, autoreset_mode="SAME_STEP", **words)
         self.blind, self.told = readings == "none", told
         config = self.envs.unwrapped.config
@@ -331,11 +342,8 @@ def teach(options: argparse.Namespace) -> Path:
     rng, readings = np.random.default_rng(options.seed), options.readings
     first = 10_000_000 + 1000 * options.seed
     robot, pace = robot_of(options.robot, options.frequency), options.frequency
-    told = options.teacher_knows == "side"
-    classes = [
-        Class(scene, readings, first + i, robot, pace, told)
-        for i, scene in enumerate(options.scene)
-    ]
+    how = robot, pace, math.radians(options.swing), options.teacher_knows == "side"
+    classes = [Class(scene, readings, first + i, *how) for i, scene in enumerate(options.scene)]
     network = Network(classes[0].observation.shape[1])
     if readings == "none":
         blindfold(network)
@@ -349,7 +357,8 @@ def teach(options: argparse.Namespace) -> Path:
         print(f"{minutes:.1f} min: {decisions} decisions, {100 * right:.0f} % as told", flush=True)
     lessons.train(10, RATE / 5)
     words = f"scenes {' '.join(options.scene)}, readings {readings}, seed {options.seed}"
-    words += f", robot {options.robot}, {pace:g} Hz, teacher knows {options.teacher_knows}"
+    words += f", robot {options.robot}, {pace:g} Hz, swing {options.swing:g}°"
+    words += f", teacher knows {options.teacher_knows}"
     about = f"examples/imitate.py, {words}, {decisions} decisions"
     options.out.mkdir(parents=True, exist_ok=True)
     return network.save(options.out / "policy.onnx", classes[0].envs.unwrapped.config, about)
@@ -362,6 +371,7 @@ def main() -> None:
     parser.add_argument("--readings", default="own", choices=["own", "none"], help="what it feels")
     parser.add_argument("--robot", default="scuttle", help="name or TOML file of the robot")
     parser.add_argument("--frequency", type=float, default=FREQUENCY, help="of the gait [Hz]")
+    parser.add_argument("--swing", type=float, default=0.0, help="of the antenna bases [deg]")
     parser.add_argument("--teacher-knows", default="nothing", choices=["nothing", "side"])
     parser.add_argument("--decisions", type=int, default=60_000, help="600 a scene and round")
     parser.add_argument("--seed", type=int, default=1, help="of all chance")

@@ -21,6 +21,7 @@ from recorded import recorded
 from twin_rig import Driven
 
 from antennate.cli import main, viewer
+from antennate.control.policy.actors import make_actor
 from antennate.control.policy.contract import Contract, contract_of, require_match
 from antennate.control.policy.controller import Policy
 from antennate.control.policy.interface import PolicyInterface, Quantity, actions, observations
@@ -31,6 +32,7 @@ from antennate.errors import BadInputError, ConfigError, OutputError
 from antennate.experiments.tunnel.batch import run_trials
 from antennate.experiments.tunnel.physics import TrialResult, TunnelConfig
 from antennate.params.control import ControlParams
+from antennate.params.gaits import GaitParams
 from antennate.robots.spec import RobotSpec
 from antennate.testing import check_controller
 from antennate.types import AntennaFrame, Maneuver, State
@@ -126,6 +128,19 @@ def test_a_policy_that_chooses_gives_the_answer_with_the_largest_score(tmp_path:
     best = np.argmax(x @ layers[0][0].T, axis=1)
     assert len(set(best.tolist())) > 2
     assert (answers == table[best]).all()
+
+
+def test_a_policy_of_the_gait_sweeps_the_antenna_bases_and_holds_them() -> None:
+    """A sin(2 pi f t) of the gait, while the robot moves; rows that hold keep theirs."""
+    control = ControlParams(gait=GaitParams(antenna_amplitude=0.3, antenna_frequency=0.5))
+    actor = make_actor(PolicyInterface(action="gait"), control, RobotSpec(), 2)
+    actor.reset(np.array([0, 1]))
+    actor.decide(np.zeros((2, 4)), np.array([True, True]))
+    for hold in [False] * 50 + [True] * 25:
+        command = actor.step(np.array([hold, False]))
+    found = command.antenna - control.gait.antenna_mean
+    assert np.abs(found[0] - 0.3 * math.sin(math.pi * 0.50)).max() < 1e-9
+    assert np.abs(found[1] - 0.3 * math.sin(math.pi * 0.75)).max() < 1e-9
 
 
 @pytest.mark.parametrize("mode", MODES)
