@@ -3,8 +3,8 @@
 Parts, one command each; what was stopped goes on with the same command:
 
 - `search`: each rule at each of PACES in the eight scenes of the board, 20 draws of seed 592000.
-- `judge`: each at the pace that the search gave it, 100 fresh draws, 20 each of PARTS hidden seeds;
-  beside them `geometric` at its pace, told a side by TELLERS.
+- `judge`: the best rule that feels and the best blind one, 100 fresh draws, 20 each of PARTS hidden
+  seeds; beside them `geometric` at its pace, told a side by TELLERS.
 - `table`: the pace of each rule and how it was chosen, and the board of the judged run.
 
 Asked are the rules of the board that are near its top. `open` crosses 92 of 800 there, and `map`
@@ -17,9 +17,10 @@ within noise if it crosses fewer by no more than one standard error of the diffe
 once: its difference is summed over the scenes, and the error is that of the sum over 20 draws.
 
 The judgement, written before, too: of the rules that feel and of the blind ones the one that
-crosses most stands for its kind, the faster one of equals. Touch pays if it crosses at least 15
-points of 100 more, the 95 % interval above 5, and takes at least 25 % less time, the interval below
--15 %. Intervals are percentiles of 10,000 samples of the draws, each with all its scenes.
+crosses most in the search, at its pace, stands for its kind, the faster one of equals. Touch pays
+if on the fresh draws it crosses at least 15 points of 100 more, the 95 % interval above 5, and
+takes at least 25 % less time, the interval below -15 %. Intervals are percentiles of 10,000 samples
+of the draws, each with all its scenes.
 
 A teller is judged by the same words against the same blind rule. It uses all that a sense of its
 AUC can tell at a decision, with an error anew each time, which is the best case. If the one of
@@ -121,20 +122,21 @@ def chosen(found: Mapping[str, tuple[Floats, Floats]]) -> dict[str, str]:
     return best
 
 
+def best_of(rules: Iterable[str], found: Mapping[str, tuple[Floats, Floats]]) -> str:
+    """The rule of these that crosses most at its pace, the faster one of equals, as text."""
+    paces = chosen(found)
+    texts = [paces[rule] for rule in rules if rule in paces]
+    return max(texts, key=lambda text: (found[text][0].sum(), -found[text][1].mean()))
+
+
 def compared(found: Mapping[str, tuple[Floats, Floats]]) -> Iterable[str]:
-    """The best rule that feels, and each teller, beside the best blind one, as judged above."""
-    by_rule = {plain(name): values for name, values in found.items()}
-    ours, blind = (
-        max(
-            (rule for rule in rules if rule in by_rule),
-            key=lambda rule: (by_rule[rule][0].sum(), -by_rule[rule][1].mean()),
-        )
-        for rules in (FEELS, BLIND)
-    )
+    """All others beside the blind rule, as judged above."""
+    short = short_names(map(plain, found))
+    blind = next(name for name in found if plain(name) in BLIND)
+    others = [name for name in found if name != blind]
     return [
-        judged(name, by_rule[rule], blind, by_rule[blind])
-        for name, rule in ((short_names(by_rule)[rule], rule) for rule in by_rule)
-        if rule == ours or rule in TELLERS
+        judged(short[plain(name)], found[name], short[plain(blind)], found[blind])
+        for name in others
     ]
 
 
@@ -188,9 +190,9 @@ def main() -> None:
         texts = [at(rule, pace) for rule in (*BLIND, *FEELS) for pace in PACES]
         run(given.folder / "search", texts, SEARCH, given.draws or DRAWS, given.workers)
     else:
-        best = chosen(cells(read_rows(given.folder / "search" / "trials.csv")))
-        pace = best["geometric"].removeprefix("geometric")
-        texts = [*best.values(), *(name + pace for name in TELLERS)]
+        found = cells(read_rows(given.folder / "search" / "trials.csv"))
+        pace = chosen(found)["geometric"].removeprefix("geometric")
+        texts = [best_of(BLIND, found), best_of(FEELS, found), *(name + pace for name in TELLERS)]
         for part in range(1, PARTS + 1):
             run(given.folder / f"judged-{part}", texts, None, given.draws or DRAWS, given.workers)
 
