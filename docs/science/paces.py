@@ -82,11 +82,16 @@ def at(rule: str, pace: float) -> str:
 
 
 def run(
-    folder: Path, controllers: Iterable[str], seed: int | None, draws: int, workers: int
+    folder: Path,
+    controllers: Iterable[str],
+    seed: int | None,
+    draws: int,
+    workers: int,
+    scenes: Iterable[str] = SCENES_OF_BOARD,
 ) -> None:
     """Run a competition, or go on with it; without a seed, with a hidden one."""
     command = [sys.executable, "-m", "antennate", "compete", "--out", folder, "--resume"]
-    command += ["--controllers", *controllers, "--scenes", *SCENES_OF_BOARD]
+    command += ["--controllers", *controllers, "--scenes", *scenes]
     command += ["--hidden"] if seed is None else ["--seed", str(seed)]
     command += ["--trials", str(draws), "--workers", str(workers), "--no-figures"]
     if code := subprocess.run(command, check=False).returncode:

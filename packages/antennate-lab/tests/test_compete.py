@@ -22,6 +22,7 @@ import antennate
 from antennate.cli import main
 from antennate.cli.terminal import BAD_INPUT
 from antennate.errors import BadInputError, ConfigError, OutputError
+from antennate.robots.spec import RobotSpec
 from antennate.studies.formats import to_csv
 from antennate.studies.pool import Workers
 from antennate.studies.run_directory import RunDirectory
@@ -1040,6 +1041,15 @@ def test_rows_that_were_not_run_are_not_compared() -> None:
 
 
 # scenes and controllers with other parameters
+
+
+def test_a_scene_takes_a_robot_by_its_name_or_file(tmp_path: Path) -> None:
+    (own := tmp_path / "own.toml").write_text("[antenna]\nlength = 0.15\n")
+    longer = tunnel_config(f"uturn+robot={own}+readings=none", "open", 0)
+    assert (longer.robot.antenna.length, longer.readings) == (0.15, ("none",))
+    assert tunnel_config("uturn+robot=scuttle3d", "open", 0).robot == RobotSpec.named("scuttle3d")
+    with pytest.raises(ConfigError, match=r"^scenes: 'uturn.robot=no.toml': .*no.toml"):
+        tunnel_config("uturn+robot=no.toml", "open", 0)
 
 
 def test_a_scene_takes_parameters_as_the_configuration_does() -> None:

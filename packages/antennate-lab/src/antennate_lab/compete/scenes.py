@@ -1,8 +1,9 @@
 """A scene or a controller with other parameters, as text: `uturn+variation.reading_noise=3`.
 
 Behind the name stands for each parameter a +, its dotted name, = and its value, as in a TOML file;
-text needs no quotes. Numbers of the control belong to the controller, `closed+search.patience=4`,
-all others to the scene: a controller with other numbers is another controller.
+text needs no quotes, and `robot=FILE` is another robot. Numbers of the control belong to the
+controller, `closed+search.patience=4`, all others to the scene: a controller with other numbers is
+another controller.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from antennate.experiments.tunnel.physics import TunnelConfig
 from antennate.messages import shown
 from antennate.params.base import from_values
 from antennate.params.control import ControlParams
+from antennate.robots.spec import RobotSpec
 from antennate.sim.episode import time_limit_of
 from antennate.sim.trial import draw_scene, scene_of
 from antennate_lab.compete.config import PART, plain
@@ -49,6 +51,8 @@ def tunnel_config(text: str, controller: str, seed: int) -> TunnelConfig:
         if values["readings"] == (YOKED,):
             raise ConfigError(f"scenes: expected readings of its own, found {shown(text)}")
     try:
+        if isinstance(robot := values.get("robot"), str):
+            values["robot"] = RobotSpec.named(robot)
         return from_values(TunnelConfig, values)
     except ConfigError as error:
         raise ConfigError(f"scenes: {shown(text)}: {error}") from None
