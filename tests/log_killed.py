@@ -24,7 +24,7 @@ _SAID = struct.Struct("<Qd")
 
 
 def write(path: Path, said: int) -> None:
-    """Write ticks at 100 Hz for ever; say each one's number and time before its write."""
+    """Write ticks at 100 Hz for ever; after each, say its number and the time before its write."""
     log = LogWriter(path, HEADER, least_free=0.0)
     os.write(said, _SAID.pack(0, time.monotonic()))
     start = time.monotonic()

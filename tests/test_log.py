@@ -575,7 +575,7 @@ def test_G1_a_killed_program_loses_a_quarter_of_a_second_at_most(
     results = json.loads(done.stdout)
     assert len(results) == kills
     for given, read, missing, bad, wrong, lost in results:
-        assert read <= given
+        assert read <= given + 1  # the kill may come before a write is told
         assert lost <= 0.25
         assert (missing, wrong) == (0, 0)
         assert bad <= 1  # the chunk that was being written
