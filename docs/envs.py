@@ -281,10 +281,10 @@ uv run --no-sync antennate tunnel --scene uturn --trials 100 --seed 67957488 \\
 uv run python docs/science/learned.py  # all tables, of the rows beside it
 ```
 
-- **Other students**: `--robot FILE` teaches one with other antennae, `--frequency 0.8` one that
-  walks no faster than today's legs can. With `--teacher-knows side` its teacher is told the side on
-  which the way goes on, and the student learns to say it, from its own senses. No such student has
-  been judged yet.
+- **Other students**: `--robot FILE` teaches one with other antennae, `--swing 20` one whose
+  antennae sweep, `--frequency 0.8` one that walks no faster than today's legs can. With
+  `--teacher-knows side` its teacher is told the side on which the way goes on, and the student
+  learns to say it, from its own senses. No such student has been judged yet.
 - **What it lacks**: 22 of its 24 failures turn round and leave by the entrance. So do 17 of the 18
   of its teacher, `geometric` at 1 Hz.
 - **Where it had not learned**, at the corner of 120° and in the dead end, it beats `closed` and
