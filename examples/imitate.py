@@ -165,25 +165,15 @@ class Class:
         scene: Name of the scene.
         readings: What the student is given to read: own or none.
         seed: Of the episodes.
-        robot: The robot.
-        frequency: Gait cycles a second [Hz].
-        swing: Amplitude of the sweep of the antenna bases [rad].
         told: Whether the teacher knows the side.
+        frequency: Gait cycles a second [Hz].
+        words: What its environments are made of.
     """
 
     def __init__(
-        self,
-        scene: str,
-        readings: str,
-        seed: int,
-        robot: RobotSpec,
-        frequency: float,
-        swing: float,
-        told: bool,
+        self, scene: str, readings: str, seed: int, told: bool, frequency: float, words: dict
     ) -> None:
-        words = {"num_envs": ROWS, "interface": interface_of(frequency)}
-        words["control"] = {"gait": {"antenna_amplitude": swing}}
-        self.envs = gym.make_vec(SCENES[scene], robot=robot, autoreset_mode="SAME_STEP", **words)
+        self.envs = gym.make_vec(SCENES[scene], ROWS, autoreset_mode="SAME_STEP", **words)
         self.blind, self.told = readings == "none", told
         config = self.envs.unwrapped.config
         self.teacher = Teacher(config.control, config.robot, ROWS, frequency)
@@ -342,7 +332,9 @@ def teach(options: argparse.Namespace) -> Path:
     rng, readings = np.random.default_rng(options.seed), options.readings
     first = 10_000_000 + 1000 * options.seed
     robot, pace = robot_of(options.robot, options.frequency), options.frequency
-    how = robot, pace, math.radians(options.swing), options.teacher_knows == "side"
+    told, gait = options.teacher_knows == "side", {"antenna_amplitude": math.radians(options.swing)}
+    words = {"robot": robot, "interface": interface_of(pace), "control": {"gait": gait}}
+    how = told, pace, words
     classes = [Class(scene, readings, first + i, *how) for i, scene in enumerate(options.scene)]
     network = Network(classes[0].observation.shape[1])
     if readings == "none":

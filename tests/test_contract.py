@@ -173,7 +173,7 @@ def same_everywhere(folder: Path, name: str, trial: int, ticks: float) -> set[in
 
 def test_M7_G7_all_worlds_decide_the_same_in_the_same_scene(tmp_path: Path) -> None:
     """Four seconds with a turn and a step back."""
-    met = same_everywhere(tmp_path, "paper", 1, 400)
+    met = same_everywhere(tmp_path, "paper", 2, 400)
     assert {Maneuver.FORWARD, Maneuver.REVERSE} < met
 
 

@@ -66,8 +66,8 @@ def _draw_walk(panel: Axes, outcome: FitOutcome) -> None:
     panel.set_title(course.name)
     low, high = panel.get_ylim()
     panel.set_ylim(low, high + 0.1 * (high - low))  # room for words above the lines
-    short = {"handlelength": 0.8, "handletextpad": 0.3, "columnspacing": 0.7}
-    panel.legend(loc="upper center", ncols=3, fontsize=6, borderpad=0.0, **short)
+    short = {"handlelength": 0.5, "handletextpad": 0.3, "columnspacing": 0.5}
+    panel.legend(loc="upper center", ncols=3, fontsize=7, borderpad=0.0, **short)
 
 
 def _intervals(outcome: FitOutcome | ServoFit) -> Figure:
