@@ -166,7 +166,7 @@ def test_S9_the_file_of_another_board_is_refused() -> None:
     require_sensor(rig(TwinConfig()).session.board.hello, "0" * 16)  # it has not greeted yet
     made = rig(TwinConfig())
     made.clock.sleep(0.1)
-    made.session.board.poll(made.clock.now())
+    made.session.board.poll(made.clock.now)
     twin = b"twin\0\0\0\0".hex()
     require_sensor(made.session.board.hello, twin)
     require_sensor(made.session.board.hello, "left-1")

@@ -52,7 +52,7 @@ def spoken(greeting: bytes, counts: tuple[int, int] = (1800, 1810), flags: int =
     for n in range(20):
         sample = dataclasses.replace(made(n), left=counts[0], right=counts[1], flags=flags)
         wire.came += encoded(sample)
-        board.poll(n * 0.01)
+        board.poll(Now(n * 0.01).now)
     return board
 
 
@@ -67,6 +67,33 @@ def test_S2_a_reading_at_a_rail_comes_as_it_was_read() -> None:
     """What it is worth is judged by the diagnosis of its channel, and nowhere before."""
     board = spoken(hello(), counts=(0, 4095), flags=frame.FLAG_LEFT_RAIL | frame.FLAG_RIGHT_RAIL)
     assert BoardReader(board, Now(0.19)).read()[1].tolist() == [[0.0, 4095.0]]
+
+
+def test_a_program_that_is_held_up_as_it_reads_makes_no_later_sample_old() -> None:
+    """For 75 ms, between its clock and its port or between the port and its clock."""
+
+    class Slow(Wire):
+        """A wire whose reader is held up before it reads, once; samples come meanwhile."""
+
+        held = 0.0
+
+        def read(self, most: int, timeout: float) -> bytes:
+            clock.time += self.held
+            self.came += b"".join(encoded(made(n)) for n in range(20, 20 + round(100 * self.held)))
+            self.held = 0.0
+            return super().read(most, timeout)
+
+    wire, clock = Slow(), Now(0.0)
+    board = Board(wire, age_limit=0.05)
+    wire.came = hello()
+    for n in range(20):
+        clock.time, wire.came = 0.01 * n, wire.came + encoded(made(n))
+        board.poll(clock.now)
+    clock.time, wire.held = 0.195, 0.08
+    assert board.poll(clock.now) == 8
+    clock.time, wire.came = 0.281, encoded(made(28))
+    assert board.poll(clock.now) == 1
+    assert board.clock.age(clock.now()) < 0.005
 
 
 def test_samples_that_the_board_took_too_late_are_counted() -> None:
@@ -84,10 +111,10 @@ def test_E8_no_sample_of_a_board_with_old_firmware_is_used() -> None:
 def test_L13_another_board_is_refused_and_its_samples_are_not_used() -> None:
     port = Pieces(hello() + encoded(made(0)))
     board = Board(port, 0.05)
-    assert board.poll(0.0) == 1
+    assert board.poll(Now(0.0).now) == 1
     stranger = hello(boot=9, device=b"stranger")
     port.data = stranger + encoded(made(1, boot=9))
-    assert board.poll(0.01) == 0
+    assert board.poll(Now(0.01).now) == 0
     assert "found another one" in board.refusals[-1]
     assert board.clock.resets == 0
 
@@ -98,7 +125,7 @@ def backlog(seconds: float) -> tuple[Board, Pieces, float]:
     board = Board(port, 0.05)
     for n in range(100):
         port.data += encoded(made(n))
-        board.poll(0.01 * n)
+        board.poll(Now(0.01 * n).now)
     end = 100 + round(100 * seconds)
     port.data = b"".join(encoded(made(n)) for n in range(100, end))
     return board, port, 0.01 * (end - 1)
@@ -106,7 +133,7 @@ def backlog(seconds: float) -> tuple[Board, Pieces, float]:
 
 def test_L17_after_a_sleep_of_5_s_the_newest_sample_is_used_and_the_oldest_are_counted() -> None:
     board, _, now = backlog(5.0)
-    used = board.poll(now)
+    used = board.poll(Now(now).now)
     newest = board.newest(now)
     assert newest is not None
     assert newest.seq == 599
@@ -120,10 +147,10 @@ def test_L17_a_backlog_without_its_newest_part_is_not_acted_upon() -> None:
     """What Linux keeps for a line is the oldest; the rest was lost when its buffer was full."""
     board, port, now = backlog(5.0)
     port.data = port.data[: 4 * SAMPLE_FRAME_SIZE * 100]
-    board.poll(now)
+    board.poll(Now(now).now)
     assert board.newest(now) is None
     port.data = b"".join(encoded(made(n)) for n in range(598, 600))
-    board.poll(now)
+    board.poll(Now(now).now)
     assert board.newest(now) is not None
 
 
@@ -136,5 +163,5 @@ def test_L17_a_port_that_never_ends_does_not_hold_up_the_loop() -> None:
             return bytes(most)
 
     port = Flood()
-    Board(port, 0.05).poll(0.0)
+    Board(port, 0.05).poll(Now(0.0).now)
     assert port.reads <= 64

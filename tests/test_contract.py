@@ -9,6 +9,7 @@ from __future__ import annotations
 import copy
 import math
 from collections import Counter
+from collections.abc import Callable
 from itertools import pairwise
 from pathlib import Path
 
@@ -135,9 +136,9 @@ def test_M7_time_of_a_board_follows_the_host_whatever_comes_and_never_goes_back(
             self.epoch, self.taken = 0, -1.0
             self.clock = DeviceClock()
 
-        def poll(self, now: float) -> int:
+        def poll(self, clock: Callable[[], float]) -> int:
             self.epoch += rng.random() < 0.01
-            self.taken = max(self.taken, now - rng.uniform(0.0, 0.05))
+            self.taken = max(self.taken, clock() - rng.uniform(0.0, 0.05))
             return 1
 
         def newest(self, now: float) -> Timed | None:

@@ -330,7 +330,7 @@ def streaming(board: Board, terminal: Terminal, first: int, begin: float) -> flo
     """Send a sample every 10 ms until one is used; how long that took [s]."""
     start = time.monotonic()
     n = first
-    while (used := board.poll(time.monotonic() - begin)) == 0:
+    while (used := board.poll(lambda: time.monotonic() - begin)) == 0:
         assert time.monotonic() - start < 20.0
         os.write(terminal.master, encoded(made(n)))
         n += 1
@@ -351,7 +351,7 @@ def test_L12_L13_a_board_that_comes_back_under_another_name_streams_within_a_sec
     os.write(terminal.master, encoded(made(90))[:9])
     terminal.unplug()
     for _ in range(30):
-        board.poll(time.monotonic() - begin)
+        board.poll(lambda: time.monotonic() - begin)
         time.sleep(0.01)
     assert board.trouble
     assert board.clock.age(time.monotonic() - begin) > 0.05

@@ -227,7 +227,7 @@ def before_twin(config: TunnelConfig, name: str, trial: int) -> Stage:
     bus = Bus(clock, Timing(spec.baud, latest=ANSWER), clock=clock.now)
     while board.newest(clock.now()) is None and clock.now() < _WARM_UP:
         clock.sleep(period)
-        board.poll(clock.now())
+        board.poll(clock.now)
     bringup.require(bus, {servo.get("id"): servo.model.number for servo in robot.servos})
     torque.arm_watchdogs(bus, spec.ids)
     clock.sleep_until(period * np.ceil(clock.now() / period + 1.0))

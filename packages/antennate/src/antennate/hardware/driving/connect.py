@@ -137,7 +137,7 @@ def prepare(
     require_quick(bus, config.robot.ids[:3], config.robot.baud, clock.now, path)
     master = Bus(bus, Timing(config.robot.baud, latest=ANSWER), clock=clock.now)
     require_servos(master, config.robot)
-    board.count_anew(clock.now())
+    board.count_anew(clock.now)
     session = Session(
         board=board,
         actuators=DynamixelActuators(
@@ -189,7 +189,7 @@ def await_board(
                 f"--esp32: expected an antenna board within {patience:g} s, found {why}"
             )
         clock.sleep_until(clock.now() + _PATIENCE)
-        board.poll(clock.now())
+        board.poll(clock.now)
     if bus is not None:
         _require_quiet(bus, clock)
 

@@ -68,14 +68,19 @@ class Board:
         """Samples that never came since `count_anew`; 0 at least, though some may come late."""
         return max(0, self.clock.lost - self._lost_before)
 
-    def count_anew(self, now: float) -> None:
-        """Forget what was lost by now [s], as while servos were looked for and nobody read."""
-        self.poll(now)
+    def count_anew(self, clock: Callable[[], float]) -> None:
+        """Forget what was lost so far, as while servos were looked for and nobody read."""
+        self.poll(clock)
         self._lost_before = self.clock.lost
 
-    def poll(self, now: float) -> int:
-        """Take the newest of what has come by now [s]; how many usable samples that were."""
-        return len(self._take(self._read(), now))
+    def poll(self, clock: Callable[[], float]) -> int:
+        """Take the newest of what has come; how many usable samples that were.
+
+        The clock [s] is read after the port. Were it read before, and the program held up between
+        the two, samples would seem to come before they did, and all later ones to be old.
+        """
+        came = self._read()
+        return len(self._take(came, clock()))
 
     def wait(self, timeout: float, clock: Callable[[], float]) -> list[Timed]:
         """Usable samples that have come, or come within `timeout` [s] of `clock`."""
@@ -181,9 +186,10 @@ class BoardReader:
 
         A reading that is missing or too old is NaN.
         """
-        now, states = self._clock.now(), self._board.clock.states
+        states = self._board.clock.states
         before = sum(states.values())
-        self.used = self._board.poll(now)
+        self.used = self._board.poll(self._clock.now)
+        now = self._clock.now()
         self.refused = sum(states.values()) - before - self.used
         timed = self._board.newest(now)
         self._t = max(self._t, self._time(timed, now))
