@@ -4,8 +4,8 @@ Parts, one command each, from the root of the clone; what was stopped goes on wi
 
 - `teach`: five students of each of ARMS, `examples/imitate.py` with seeds 1 to 5.
 - `judge`: each on the 20 draws of one part of the judged board, which `paces.py` left in BOARD.
-- `table`: each arm beside the best blind rule there, by the words of `paces.py`, and the arms
-  beside one another.
+- `table`: each arm beside the blind rules there, by the words of `paces.py`, and the arms beside
+  one another.
 
 The teacher is the search of `geometric` at 0.8 Hz, told the side on which the way goes on; the
 student learns to say that side, too. All have the same budget, chosen before: 60,000 decisions in
@@ -88,11 +88,10 @@ def table(folder: Path, board: Path) -> None:
     for arm in ARMS:
         rows += rows_of(f"judged-{arm}-?/trials.csv", folder, arm)
     found = cells(rows)
-    blind = next(name for name in found if name in BLIND)
     print("| | crossed | time [% of limit] |\n|---|---|---|")
     for name, (crossed, share) in found.items():
         print(f"| {name} | {crossed.sum():.0f} of {crossed.size} | {100 * share.mean():.1f} |")
-    pairs = [*((arm, blind) for arm in ARMS), ("design45", "today")]
+    pairs = [*((arm, blind) for arm in ARMS for blind in BLIND), ("design45", "today")]
     pairs += [(arm, "blind") for arm in ("today", "design45")]
     print("", *(judged(a, found[a], b, found[b]) for a, b in pairs), sep="\n\n")
 
