@@ -67,6 +67,8 @@ TIMES: Mapping[str, Sequence[str]] = {
 RATES: Mapping[str, Sequence[str]] = {"schedule": ("schedule.turn_rate",)}
 """What is taken for so much a second."""
 RESAMPLES = 10_000
+SEARCHED = Path(__file__).with_name("paces_search.csv")
+"""Rows of the search, for a folder without one."""
 
 
 def at(rule: str, pace: float) -> str:
@@ -111,6 +113,12 @@ def cells(rows: Iterable[EpisodeRow]) -> dict[str, tuple[Floats, Floats]]:
         for name, draws in found.items()
         for table in [np.array([draws[key] for key in sorted(draws)]).reshape(shape)]
     }
+
+
+def searched(folder: Path) -> dict[str, tuple[Floats, Floats]]:
+    """What was crossed in the search of a folder, or in the one that is kept here."""
+    path = folder / "search" / "trials.csv"
+    return cells(read_rows(path if path.exists() else SEARCHED))
 
 
 def chosen(found: Mapping[str, tuple[Floats, Floats]]) -> dict[str, str]:
@@ -159,7 +167,7 @@ def judged(ours: str, own: tuple[Floats, Floats], blind: str, other: tuple[Float
 
 def table(folder: Path) -> None:
     """Print what was searched, and the board of what was judged."""
-    found = cells(read_rows(folder / "search" / "trials.csv"))
+    found = searched(folder)
     best = chosen(found).values()
     print("| rule | pace [Hz] | crossed | time [% of limit] | chosen |\n|---|---|---|---|---|")
     for name, (crossed, share) in found.items():
@@ -190,8 +198,7 @@ def main() -> None:
         texts = [at(rule, pace) for rule in (*BLIND, *FEELS) for pace in PACES]
         run(given.folder / "search", texts, SEARCH, given.draws or DRAWS, given.workers)
     else:
-        found = cells(read_rows(given.folder / "search" / "trials.csv"))
-        best = chosen(found)
+        best = chosen(searched(given.folder))
         pace = best["geometric"].removeprefix("geometric")
         texts = [*best.values(), *(name + pace for name in TELLERS)]
         for part in range(1, PARTS + 1):
