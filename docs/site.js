@@ -1,11 +1,17 @@
-// A table that is too wide for the page shows its rows one below the other, each cell with its head.
+// A table that is too wide for a wide screen is set closer. Where that does not help, and on a phone,
+// it shows its rows one below the other, each cell with its head.
 const stack = () => {
+  const closer = window.matchMedia("(min-width: 60em)").matches;
   for (const table of document.querySelectorAll(".md-typeset table:not([class])")) {
-    delete table.dataset.stacked;
     const room = table.closest(".md-content__inner");
-    if (room && table.getBoundingClientRect().right > room.getBoundingClientRect().right) {
-      table.dataset.stacked = "";
-    }
+    const wide = () => table.getBoundingClientRect().right > room.getBoundingClientRect().right;
+    delete table.dataset.stacked;
+    delete table.dataset.close;
+    if (!room || !wide()) continue;
+    if (closer) table.dataset.close = "";
+    if (!wide()) continue;
+    delete table.dataset.close;
+    table.dataset.stacked = "";
   }
 };
 window.addEventListener("load", stack);

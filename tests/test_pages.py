@@ -191,3 +191,15 @@ def test_a_stacked_table_says_what_its_rows_are(site: str, tmp_path: Path) -> No
     ):
         found = tab.run(f"{tables}.map(e => {seen})")
     assert found == [[], ["distance to the wall"], ["width of the gap"]]
+
+
+def test_a_table_a_little_too_wide_for_a_screen_stays_a_table(site: str, tmp_path: Path) -> None:
+    """The board has nine columns and its scenes eleven; on a phone their rows are stacked."""
+    count = "document.querySelectorAll('article table[data-{}]').length".format
+    with browser(tmp_path / "browser") as tab:
+        with looked_at(tab, f"{site}/leaderboard/", 1280, "light"):
+            assert (tab.run(count("stacked")), tab.run(count("close"))) == (0, 3)
+            assert tab.run(CUT_OFF) == []
+        with looked_at(tab, f"{site}/leaderboard/", 390, "light"):
+            assert tab.run(count("stacked")) >= 3
+            assert tab.run(count("close")) == 0
