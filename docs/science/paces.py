@@ -3,8 +3,9 @@
 Parts, one command each; what was stopped goes on with the same command:
 
 - `search`: each rule at each of PACES in the eight scenes of the board, 20 draws of seed 592000.
-- `judge`: each at the pace that the search gave it, 100 fresh draws, 20 each of PARTS hidden seeds;
+- `judge`: each at the pace that the search gave it, 100 fresh draws in PARTS, each of a hidden seed;
   beside them `geometric` at its pace, told a side by TELLERS.
+- `keep`: the parts that are whole go to `paces_judged.csv`; `judge` runs those that are not there.
 - `table`: the pace of each rule and how it was chosen, and the board of the judged run.
 
 Asked are the rules of the board that are near its top. `open` crosses 92 of 800 there, and `map`
@@ -51,8 +52,10 @@ from antennate_lab.compete.standings import standing
 
 PACES, USUAL = (0.6, 0.7, 0.8), 0.6
 """Frequencies of the gait that are tried, and the default, for which times were set [Hz]."""
-SEARCH, DRAWS, PARTS = 592_000, 20, 5
-"""Seed of the search, its draws of each scene and those of a part of the judged run, and parts."""
+SEARCH, DRAWS = 592_000, 20
+"""Seed of the search, and its draws of each scene."""
+PARTS, EACH = 10, 10
+"""Parts of the judged run, and the draws of each."""
 BLIND, FEELS = ("timed", "schedule"), ("closed", "geometric")
 TELLERS = ("docs/science/told.py:told_77", "docs/science/told.py:told_65")
 TIMES: Mapping[str, Sequence[str]] = {
@@ -69,6 +72,8 @@ RATES: Mapping[str, Sequence[str]] = {"schedule": ("schedule.turn_rate",)}
 RESAMPLES = 10_000
 SEARCHED = Path(__file__).with_name("paces_search.csv")
 """Rows of the search, for a folder without one."""
+JUDGED = Path(__file__).with_name("paces_judged.csv")
+"""Rows of the judged parts that are whole."""
 
 
 def at(rule: str, pace: float) -> str:
@@ -136,6 +141,20 @@ def chosen(found: Mapping[str, tuple[Floats, Floats]]) -> dict[str, str]:
     return best
 
 
+def kept() -> list[EpisodeRow]:
+    """Rows of the judged parts that are kept here."""
+    return read_rows(JUDGED) if JUDGED.exists() else []
+
+
+def keep(folder: Path) -> None:
+    """Keep the rows of the parts of a folder that are whole."""
+    done = {row.seed for row in kept()}
+    for path in sorted(folder.glob("judged-*/trials.csv")):
+        if read_rows(path)[0].seed not in done:
+            head, _, rows = path.read_text().partition("\n")
+            JUDGED.write_text((JUDGED.read_text() if JUDGED.exists() else f"{head}\n") + rows)
+
+
 def compared(found: Mapping[str, tuple[Floats, Floats]]) -> Iterable[str]:
     """All that feel or are told beside each blind rule, as judged above."""
     short = short_names(map(plain, found))
@@ -174,7 +193,7 @@ def table(folder: Path) -> None:
         pace = name.partition("gait.frequency=")[2].partition("+")[0]
         count, time = f"{crossed.sum():.0f} of {crossed.size}", f"{100 * share.mean():.1f}"
         print(f"| `{plain(name)}` | {pace} | {count} | {time} | {'yes' * (name in best)} |")
-    rows = [row for path in sorted(folder.glob("judged-*/trials.csv")) for row in read_rows(path)]
+    rows = kept()
     if not rows:
         return
     result = standing(rows, CompeteConfig().tie)
@@ -187,13 +206,15 @@ def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("part", choices=("search", "judge", "table"))
+    parser.add_argument("part", choices=("search", "judge", "keep", "table"))
     parser.add_argument("folder", type=Path)
     parser.add_argument("--draws", type=int, help="of each scene; 2 or more, to see it run")
     parser.add_argument("--workers", type=int, default=2, help="processes")
     given = parser.parse_args()
     if given.part == "table":
         table(given.folder)
+    elif given.part == "keep":
+        keep(given.folder)
     elif given.part == "search":
         texts = [at(rule, pace) for rule in (*BLIND, *FEELS) for pace in PACES]
         run(given.folder / "search", texts, SEARCH, given.draws or DRAWS, given.workers)
@@ -201,8 +222,8 @@ def main() -> None:
         best = chosen(searched(given.folder))
         pace = best["geometric"].removeprefix("geometric")
         texts = [*best.values(), *(name + pace for name in TELLERS)]
-        for part in range(1, PARTS + 1):
-            run(given.folder / f"judged-{part}", texts, None, given.draws or DRAWS, given.workers)
+        for part in range(len({row.seed for row in kept()}), PARTS):
+            run(given.folder / f"judged-{part}", texts, None, given.draws or EACH, given.workers)
 
 
 if __name__ == "__main__":

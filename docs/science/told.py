@@ -2,8 +2,8 @@
 
     antennate compete --controllers docs/science/told.py:told_77
 
-A score is normal about +d/2 where the way goes on to the left and about -d/2 where it goes on to
-the right, d = √2 Φ⁻¹(AUC); its sign is told (docs/science/sides.md). Each decision to turn has an
+A score is normal about d/2 on the side on which the way goes on, d = √2 Φ⁻¹(AUC); its sign is told,
+so the right side with the probability Φ(d/2) (docs/science/sides.md). Each decision to turn has an
 error of its own. Where the way goes straight on neither side is right: a coin is tossed. A
 trial's chance follows from its first readings.
 """
@@ -56,8 +56,9 @@ class Told:
     def know(self, knowledge: Knowledge) -> None:
         """Take the truth, and tell a side."""
         assert knowledge.side is not None
-        score = self._half * knowledge.side + self._error
-        told = np.where(knowledge.side == 0, self._coin, np.sign(score))
+        right = self._half + self._error > 0.0
+        told = np.where(right, knowledge.side, -knowledge.side)
+        told = np.where(knowledge.side == 0, self._coin, told)
         self._made.know(Knowledge(side=told.astype(int)))
 
     def step(self, frame: AntennaFrame) -> JointCommand:
