@@ -217,8 +217,8 @@ class Twin:
         for _ in range(3):
             driven = subprocess.run(drive, cwd=self.folder, capture_output=True, timeout=120)
             result = json.loads((self.folder / out / "result.json").read_text())
-            if result["ended"] != "a HOLD":  # of a computer that was late: it goes on where it was
-                break
+            if result["ended"] not in ("a HOLD", "a fault"):
+                break  # else this computer was late, and the same command goes on where it was
         assert driven.returncode == 0, driven.stderr.decode()
         doctor = [*ANTENNATE, "doctor", "--no-config", "--json", "--compare", str(file), out]
         done = subprocess.run(doctor, cwd=self.folder, capture_output=True, timeout=400)
