@@ -230,7 +230,10 @@ class Twin:
 def test_twin_with_joints_repaired_wrongly_is_told_from_one_that_nobody_touched(
     tmp_path: Path,
 ) -> None:
-    """The gain of a leg is halved and given back; a yaw joint has 2 degrees of backlash."""
+    """The gain of a leg is halved and given back; a yaw joint has 2 degrees of backlash.
+
+    Bounds are those of a computer that misses up to a hundred cycles of a drive.
+    """
     known = KNOWN | {BACKLASH: (0.0, 0.001)}
     file = fitted(tmp_path, HEAD, **known)
     twin = Twin(tmp_path, HEAD + "[yaw]\nbacklash = [0.035, 0.0, 0.0, 0.0, 0.0]\n")
@@ -238,17 +241,17 @@ def test_twin_with_joints_repaired_wrongly_is_told_from_one_that_nobody_touched(
         twin.order("fault servo:8=position_p_gain:350")
         wrong = twin.rows("wrong", file)
         assert wrong["leg_l1"]["grade"] == "warn"
-        assert numbers_of(wrong["leg_l1"]["found"])["gain"] == pytest.approx(0.5, abs=0.05)
+        assert numbers_of(wrong["leg_l1"]["found"])["gain"] == pytest.approx(0.5, abs=0.1)
         assert wrong["yaw1"]["grade"] == "warn"
         assert "backlash not as fitted" in wrong["yaw1"]["cure"]
-        assert 1.0 < numbers_of(wrong["yaw1"]["found"])["backlash"] < 3.0
+        assert 1.0 < numbers_of(wrong["yaw1"]["found"])["backlash"] < 4.0
         assert out_of_range(wrong["leg_r2"]) <= {"lag"}
-        assert numbers_of(wrong["leg_r2"]["found"])["gain"] == pytest.approx(1.0, abs=0.1)
+        assert numbers_of(wrong["leg_r2"]["found"])["gain"] == pytest.approx(1.0, abs=0.2)
         twin.order("fault servo:8=position_p_gain:700")
         right = twin.rows("right", file)
         # A lag of the twin is up to a control period more, as its clock happens to stand.
         assert out_of_range(right["leg_l1"]) <= {"lag"}
-        assert numbers_of(right["leg_l1"]["found"])["gain"] == pytest.approx(1.0, abs=0.1)
+        assert numbers_of(right["leg_l1"]["found"])["gain"] == pytest.approx(1.0, abs=0.2)
     finally:
         twin.process.kill()
         twin.process.communicate()
