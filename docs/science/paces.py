@@ -3,7 +3,7 @@
 Parts, one command each; what was stopped goes on with the same command:
 
 - `search`: each rule at each of PACES in the eight scenes of the board, 20 draws of seed 592000.
-- `judge`: each at the pace that the search gave it, 100 fresh draws in PARTS, each of a hidden seed;
+- `judge`: each at the pace that the search gave it, 100 fresh draws, PARTS hidden seeds;
   beside them `geometric` at its pace, told a side by TELLERS.
 - `keep`: the parts that are whole go to `paces_judged.csv`; `judge` runs those that are not there.
 - `table`: the pace of each rule and how it was chosen, and the board of the judged run.

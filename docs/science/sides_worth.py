@@ -22,9 +22,8 @@ from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
-from scipy.special import ndtri
+from told import Told
 
-from antennate.control.knowledge import Knowledge
 from antennate.control.registry import make_controller
 from antennate.experiments.tunnel.batch import run_trials
 from antennate.experiments.tunnel.lockstep import Apparatus, cpu_bodies
@@ -33,7 +32,7 @@ from antennate.figures import INK, SERIES, WIDTH, canvas, render, styled
 from antennate.params.control import ControlParams
 from antennate.params.gaits import GaitParams
 from antennate.sim.knowledge import SIDE_AHEAD
-from antennate.types import AntennaFrame, Floats, JointCommand, Maneuver
+from antennate.types import AntennaFrame, Bools, Floats, Ints, JointCommand
 
 HERE = Path(__file__).parent
 SEEDS = (591_001, 591_002, 591_003)
@@ -118,12 +117,11 @@ class Errors:
         return self._places[-1][1]
 
 
-class Teller:
-    """A controller that is told a side by a teller with errors.
+class Teller(Told):
+    """A controller that is told a side by a teller with errors, for a rival.
 
-    A score is normal about +d/2 on the left and -d/2 on the right; its sign is told. An error that
-    is kept is one of right or wrong: at that place the teller is wrong whatever the side is by
-    then. Where the way goes straight on neither side is right: the teller tosses a coin.
+    An error that is kept is one of right or wrong: at that place the teller is wrong whatever the
+    side is by then.
 
     Args:
         made: The controller.
@@ -133,56 +131,43 @@ class Teller:
         batch: Rows.
     """
 
-    knows = needs = ("side",)
-
     def __init__(
         self, made: Any, rival: Rival, bodies: Any, keys: dict[int, tuple[int, ...]], batch: int
     ) -> None:
-        self._made, self._rival, self._bodies, self._keys = made, rival, bodies, keys
-        self._half = math.sqrt(0.5) * float(ndtri(rival.auc))
+        assert rival.auc is not None
+        super().__init__(made, rival.auc, batch)
+        self._rival, self._bodies, self._keys = rival, bodies, keys
         self._errors: dict[int, Errors] = {}
-        self._drawn = np.tile([0.0, 1.0], (batch, 1))
-        self._before = np.full(batch, int(Maneuver.FORWARD))
-        self._truth = np.zeros(batch, int)
-        self._told = np.zeros(batch, int)
+        self._truth, self._told = (np.zeros(batch, int) for _ in range(2))
         self.decisions: dict[int, list[tuple[int, int]]] = {}
 
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self._made, name)
-
-    def reset(self, rows: Any, phase: Any = 0.0) -> None:
+    def reset(self, rows: Ints | Bools, phase: Floats | float = 0.0) -> None:
         """Start rows anew."""
-        self._made.reset(rows, phase)
-        self._before[rows] = int(Maneuver.FORWARD)
-        for row in np.arange(len(self._before))[rows].tolist():
+        super().reset(rows, phase)
+        for row in np.arange(len(self._truth))[rows].tolist():
             self._errors[row] = Errors(self._keys[row])
             self.decisions[self._keys[row][-1]] = []
 
-    def know(self, knowledge: Knowledge) -> None:
-        """Take the truth; tell the controller a side."""
-        assert knowledge.side is not None
-        self._truth, (error, coin) = knowledge.side, self._drawn.T
-        right = self._half + error > 0.0
-        told = np.where(self._truth == 0, coin, np.where(right, self._truth, -self._truth))
+    def told(self, side: Ints) -> Ints:
+        """What is told, shape (B,); 0 at later tries of a rival that asks at the first alone."""
+        self._truth, self._told = side, super().told(side)
         if self._rival.first:
-            told = np.where(self._made.rule._search.tries == 0, told, 0.0)
-        self._told = told.astype(int)
-        self._made.know(Knowledge(side=self._told))
+            self._told *= self._made.rule._search.tries == 0
+        return self._told
+
+    def drawn(self, row: int) -> tuple[float, float]:
+        """Error and coin of a row, the same for all rivals."""
+        errors = self._errors[row]
+        kept = self._rival.kept
+        return errors.of_place(self._bodies.world(row).head[:2]) if kept else errors.next()
 
     def step(self, frame: AntennaFrame) -> JointCommand:
-        """One control period; a draw for each row that begins to back off."""
-        command = self._made.step(frame)
-        now, before = self._made.maneuver, self._before
-        now = np.where(now == int(Maneuver.HOLD), before, now)
-        backs, backed = (m == int(Maneuver.REVERSE) for m in (now, before))
-        for row in np.flatnonzero(backs & ~backed).tolist():
-            errors = self._errors[row]
-            head = self._bodies.world(row).head[:2]
-            self._drawn[row] = errors.of_place(head) if self._rival.kept else errors.next()
-        for row in np.flatnonzero(backed & ~backs).tolist():
+        """One control period; a row that has backed off has decided."""
+        backed = self._backed
+        command = super().step(frame)
+        for row in np.flatnonzero(backed & ~self._backed).tolist():
             decision = int(self._truth[row]), int(self._told[row])
             self.decisions[self._keys[row][-1]].append(decision)
-        self._before = now
         return command
 
 

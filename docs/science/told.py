@@ -4,8 +4,7 @@
 
 A score is normal about d/2 on the side on which the way goes on, d = √2 Φ⁻¹(AUC); its sign is told,
 so the right side with the probability Φ(d/2) (docs/science/sides.md). Each decision to turn has an
-error of its own. Where the way goes straight on neither side is right: a coin is tossed. A
-trial's chance follows from its first readings.
+error of its own. Where the way goes straight on neither side is right: a coin is tossed.
 """
 
 from __future__ import annotations
@@ -25,20 +24,20 @@ from antennate.types import AntennaFrame, Bools, Floats, Ints, JointCommand, Man
 
 
 class Told:
-    """A search that is told a side with errors.
+    """A controller that is told a side with errors.
+
+    A trial's chance follows from its first readings.
 
     Args:
-        auc: AUC of the score that tells it.
-        control: All numbers of the control.
-        robot: The robot.
+        made: The controller.
+        auc: AUC of the score that tells the side.
         batch: Number of robots B.
     """
 
     knows = needs = ("side",)
 
-    def __init__(self, auc: float, control: ControlParams, robot: RobotSpec, batch: int) -> None:
-        self._made: Any = make_controller("geometric", control, robot, batch)
-        self._half = math.sqrt(0.5) * float(ndtri(auc))
+    def __init__(self, made: Any, auc: float, batch: int) -> None:
+        self._made, self._half = made, math.sqrt(0.5) * float(ndtri(auc))
         self._chance: dict[int, np.random.Generator] = {}
         self._error, self._coin = np.zeros(batch), np.ones(batch)
         self._backed = np.zeros(batch, bool)
@@ -56,10 +55,21 @@ class Told:
     def know(self, knowledge: Knowledge) -> None:
         """Take the truth, and tell a side."""
         assert knowledge.side is not None
+        self._made.know(Knowledge(side=self.told(knowledge.side)))
+
+    def told(self, side: Ints) -> Ints:
+        """What is told: 1 is left, -1 right, shape (B,).
+
+        Args:
+            side: The truth; 0 if the way goes straight on.
+        """
         right = self._half + self._error > 0.0
-        told = np.where(right, knowledge.side, -knowledge.side)
-        told = np.where(knowledge.side == 0, self._coin, told)
-        self._made.know(Knowledge(side=told.astype(int)))
+        return np.where(side == 0, self._coin, np.where(right, side, -side)).astype(int)
+
+    def drawn(self, row: int) -> tuple[float, float]:
+        """Error of a row's score, of the standard normal distribution, and a coin, -1 or 1."""
+        error, coin = self._chance[row].standard_normal(2)
+        return float(error), math.copysign(1.0, coin)
 
     def step(self, frame: AntennaFrame) -> JointCommand:
         """One control period; a row that begins to back off has another error."""
@@ -71,11 +81,15 @@ class Told:
         held = self.maneuver == int(Maneuver.HOLD)
         backs = np.where(held, self._backed, self.maneuver == int(Maneuver.REVERSE))
         for row in np.flatnonzero(backs & ~self._backed).tolist():
-            self._error[row], coin = self._chance[row].standard_normal(2)
-            self._coin[row] = math.copysign(1.0, coin)
+            self._error[row], self._coin[row] = self.drawn(row)
         self._backed = backs
         return command
 
 
-told_65, told_77 = (partial(Told, auc) for auc in (0.65, 0.77))
+def geometric(auc: float, control: ControlParams, robot: RobotSpec, batch: int) -> Told:
+    """`geometric`, told a side by a sense of an AUC."""
+    return Told(make_controller("geometric", control, robot, batch), auc, batch)
+
+
+told_65, told_77 = (partial(geometric, auc) for auc in (0.65, 0.77))
 """The best antenna that was found, and the bound of the ten best (docs/science/sides.md)."""
