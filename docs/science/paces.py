@@ -150,9 +150,12 @@ def keep(folder: Path) -> None:
     """Keep the rows of the parts of a folder that are whole."""
     done = {row.seed for row in kept()}
     for path in sorted(folder.glob("judged-*/trials.csv")):
-        if read_rows(path)[0].seed not in done:
-            head, _, rows = path.read_text().partition("\n")
-            JUDGED.write_text((JUDGED.read_text() if JUDGED.exists() else f"{head}\n") + rows)
+        rows = read_rows(path)
+        if late := [row for row in rows if row.outcome == "invalid"]:
+            sys.exit(f"{path}: expected valid episodes alone, found {len(late)}: {late[0].reason}")
+        if rows[0].seed not in done:
+            head, _, rest = path.read_text().partition("\n")
+            JUDGED.write_text((JUDGED.read_text() if JUDGED.exists() else f"{head}\n") + rest)
 
 
 def compared(found: Mapping[str, tuple[Floats, Floats]]) -> Iterable[str]:

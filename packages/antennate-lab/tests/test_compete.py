@@ -121,6 +121,14 @@ class Curious(Entry):
     knows, needs = ("map",), ()
     def know(self, knowledge):
         raise RuntimeError("it was told")
+class Learns(Entry):
+    """It loads what it needs when it is first told something."""
+    needs, slow = ("side",), 0
+    def know(self, knowledge):
+        if self.ticks == self.slow:
+            Busy.fault(self, None)
+class LearnsLate(Learns):
+    slow = 1
 class Breaks(Entry):
     """What it changes would fail outside of its own decisions, in a process that others share."""
     def fault(self, command):
@@ -170,6 +178,7 @@ def episodes(
         ("Swallows", "a decision took longer than 0.2 s on the clock"),
         ("Begins", "a decision took longer than 50 ms of the processor"),
         ("SlowReset", "a reset took longer than 1 s on the clock"),
+        ("LearnsLate", "know took longer than 50 ms of the processor"),
     ],
 )
 def test_what_fails_in_a_trial_is_invalid_with_its_reason(
@@ -185,6 +194,13 @@ def test_a_decision_within_the_limit_is_none_that_took_too_long(
     entries: Callable[[str], str],
 ) -> None:
     assert [r.outcome for r in episodes(entries("Busy"), 2, limit=5.0)] == ["timeout"] * 2
+
+
+@pytest.mark.ci
+def test_the_first_decision_may_take_longer_in_what_it_is_told_too(
+    entries: Callable[[str], str],
+) -> None:
+    assert [row.reason for row in episodes(entries("Learns"), 2)] == ["", ""]
 
 
 @pytest.mark.ci

@@ -96,7 +96,7 @@ class Apart:
 
     def know(self, knowledge: Knowledge) -> None:
         """Tell the controller what it knows; see `Knowing`."""
-        self._ask(self._limit, "know", knowledge)
+        self._ask(self._decision_limit, "know", knowledge)
 
     def reset(self, rows: Ints | Bools, phase: Floats | float = 0.0) -> None:
         """Start some rows of the controller anew; see `Controller`."""
@@ -104,8 +104,8 @@ class Apart:
 
     def step(self, frame: AntennaFrame) -> JointCommand:
         """Answer of the controller to a frame; see `Controller`."""
-        limit = self._limit * (1.0 if self._begun else WAITING)
-        command, self.maneuver, self.contact, self.level, void = self._ask(limit, "step", frame)
+        found = self._ask(self._decision_limit, "step", frame)
+        command, self.maneuver, self.contact, self.level, void = found
         self.void_decisions = void
         self._begun = True
         return command
@@ -122,6 +122,11 @@ class Apart:
                     _kill_below(self._warden)
                     os.kill(self._warden, signal.SIGKILL)
                 time.sleep(1e-3)
+
+    @property
+    def _decision_limit(self) -> float:
+        """Processor time of a part of the next decision [s]; the first one loads libraries."""
+        return self._limit * (1.0 if self._begun else WAITING)
 
     def _ask(self, limit: float, *call: Any) -> Any:
         """What it answers; refused if it took longer on the processor [s], or waits for long."""
