@@ -146,14 +146,19 @@ def kept() -> list[EpisodeRow]:
     return read_rows(JUDGED) if JUDGED.exists() else []
 
 
+def valid_rows(path: Path) -> list[EpisodeRow]:
+    """Rows of a table whose episodes are all valid."""
+    rows = read_rows(path)
+    if late := [row.reason for row in rows if row.outcome == "invalid"]:
+        sys.exit(f"{path}: expected valid episodes alone, found {len(late)}: {late[0]}")
+    return rows
+
+
 def keep(folder: Path) -> None:
     """Keep the rows of the parts of a folder that are whole."""
     done = {row.seed for row in kept()}
     for path in sorted(folder.glob("judged-*/trials.csv")):
-        rows = read_rows(path)
-        if late := [row for row in rows if row.outcome == "invalid"]:
-            sys.exit(f"{path}: expected valid episodes alone, found {len(late)}: {late[0].reason}")
-        if rows[0].seed not in done:
+        if valid_rows(path)[0].seed not in done:
             head, _, rest = path.read_text().partition("\n")
             JUDGED.write_text((JUDGED.read_text() if JUDGED.exists() else f"{head}\n") + rest)
 

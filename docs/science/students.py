@@ -1,9 +1,10 @@
-"""Students by touch and their rivals: `python docs/science/students.py PART FOLDER BOARD`.
+"""Students by touch and their rivals: `python docs/science/students.py PART FOLDER`.
 
 Parts, one command each, from the root of the clone; what was stopped goes on with the same command:
 
 - `teach`: five students of each of ARMS, `examples/imitate.py` with seeds 1 to 5.
-- `judge`: each on the 20 draws of one part of the judged board, which `paces.py` left in BOARD.
+- `judge`: each on the 20 draws of two parts of the judged board, those that `paces.py` has kept.
+- `keep`: their rows go to `students.csv`; `--seeds` asks for some of the students first.
 - `table`: each arm beside the blind rules there, by the words of `paces.py`, and the arms beside
   one another.
 
@@ -17,16 +18,16 @@ than the students of today's antenna, each by an interval that leaves out 0.
 from __future__ import annotations
 
 import argparse
+import csv
 import math
 import subprocess
 import sys
-import tomllib
 from collections.abc import Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import replace
+from dataclasses import asdict, fields, replace
 from pathlib import Path
 
-from paces import BLIND, DRAWS, PARTS, cells, judged, run
+from paces import BLIND, EACH, JUDGED, PARTS, cells, judged, kept, run, valid_rows
 
 from antennate_lab.compete.checking import read_rows
 from antennate_lab.compete.config import SCENES_OF_BOARD, plain
@@ -34,19 +35,23 @@ from antennate_lab.compete.episodes import EpisodeRow
 
 ROBOT, SWING = "docs/science/design_45.toml", 19.6
 """The best antenna that was found, and the sweep of its base [deg]."""
+STUDENTS = PARTS // 2
+"""Students of each arm."""
 ARMS = {
     "today": (),
     "design45": ("--robot", ROBOT, "--swing", f"{SWING:g}"),
     "blind": ("--readings", "none"),
 }
 """What the students are taught with."""
+WALKED = Path(__file__).with_name("students.csv")
+"""Rows of the students that are kept."""
 LESSONS = (
     *("--frequency", "0.8", "--teacher-knows", "side", "--decisions", "60000"),
     *("--scene", "uturn", "corner", "room", "deadend"),
 )
 
 
-def teach(folder: Path, workers: int) -> None:
+def teach(folder: Path, seeds: Iterable[int], workers: int) -> None:
     """Teach all students that have no policy yet, those of seed 1 first."""
 
     def one(arm: str, seed: int) -> None:
@@ -59,35 +64,48 @@ def teach(folder: Path, workers: int) -> None:
             subprocess.run([sys.executable, "examples/imitate.py", *words], stdout=told, check=True)
         print(f"{arm}-{seed}: taught", flush=True)
 
-    students = [(arm, seed) for seed in range(1, PARTS + 1) for arm in ARMS]
+    students = [(arm, seed) for seed in seeds for arm in ARMS]
     with ThreadPoolExecutor(workers) as pool:
         list(pool.map(one, *zip(*students, strict=True)))
 
 
-def judge(folder: Path, board: Path, workers: int, draws: int) -> None:
-    """Let each student walk on the draws of its part of the board."""
-    for part in range(1, PARTS + 1):
-        seed = tomllib.loads((board / f"judged-{part}" / "config.toml").read_text())["seed"]
-        for arm, own in ARMS.items():
-            texts, scenes = str(folder / f"{arm}-{part}" / "policy.onnx"), SCENES_OF_BOARD
-            if ROBOT in own:
-                texts += f"+gait.antenna_amplitude={math.radians(SWING)!r}"
-                scenes = tuple(f"{scene}+robot={ROBOT}" for scene in scenes)
-            run(folder / f"judged-{arm}-{part}", [texts], seed, draws, workers, scenes)
+def judge(folder: Path, seeds: Iterable[int], workers: int, draws: int) -> None:
+    """Let each student walk on the draws of its two parts of the board."""
+    hidden = [*dict.fromkeys(row.seed for row in kept())]
+    for student in seeds:
+        for part in (student - 1, student - 1 + STUDENTS):
+            if part >= len(hidden):
+                sys.exit(f"{JUDGED}: expected part {part + 1} of the board, found {len(hidden)}")
+            for arm, own in ARMS.items():
+                texts, scenes = str(folder / f"{arm}-{student}" / "policy.onnx"), SCENES_OF_BOARD
+                if ROBOT in own:
+                    texts += f"+gait.antenna_amplitude={math.radians(SWING)!r}"
+                    scenes = tuple(f"{scene}+robot={ROBOT}" for scene in scenes)
+                out = folder / f"judged-{arm}-{part}"
+                run(out, [texts], hidden[part], draws, workers, scenes)
 
 
-def table(folder: Path, board: Path) -> None:
-    """Print each arm beside the best blind rule, and the arms beside one another."""
-
-    def rows_of(pattern: str, where: Path, name: str) -> Iterable[EpisodeRow]:
-        for path in sorted(where.glob(pattern)):
-            for row in read_rows(path):
-                yield replace(row, controller=name or plain(row.controller))
-
-    rows = [*rows_of("judged-?/trials.csv", board, "")]
+def keep(folder: Path) -> None:
+    """Keep the rows of the students of a folder, each by the name of its arm."""
+    rows = read_rows(WALKED) if WALKED.exists() else []
+    done = {(row.controller, row.seed) for row in rows}
     for arm in ARMS:
-        rows += rows_of(f"judged-{arm}-?/trials.csv", folder, arm)
-    found = cells(rows)
+        for path in sorted(folder.glob(f"judged-{arm}-*/trials.csv")):
+            own = [replace(row, controller=arm) for row in valid_rows(path)]
+            rows += own * ((arm, own[0].seed) not in done)
+    with WALKED.open("w", newline="") as file:
+        table = csv.DictWriter(file, [field.name for field in fields(EpisodeRow)])
+        table.writeheader()
+        table.writerows(map(asdict, rows))
+
+
+def table() -> None:
+    """Print each arm beside the blind rules, and the arms beside one another."""
+    walked = read_rows(WALKED)
+    by_arm = [{row.seed for row in walked if row.controller == arm} for arm in ARMS]
+    whole = set.intersection(*by_arm)
+    board = [replace(row, controller=plain(row.controller)) for row in kept()]
+    found = cells(row for row in [*board, *walked] if row.seed in whole)
     print("| | crossed | time [% of limit] |\n|---|---|---|")
     for name, (crossed, share) in found.items():
         print(f"| {name} | {crossed.sum():.0f} of {crossed.size} | {100 * share.mean():.1f} |")
@@ -101,18 +119,22 @@ def main(argv: Sequence[str]) -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("part", choices=("teach", "judge", "table"))
-    parser.add_argument("folder", type=Path)
-    parser.add_argument("board", type=Path, help="folder of the judged board of paces.py")
-    parser.add_argument("--draws", type=int, default=DRAWS, help="of each scene; 2, to see it run")
+    parser.add_argument("part", choices=("teach", "judge", "keep", "table"))
+    parser.add_argument("folder", type=Path, help="of the students and their runs")
+    parser.add_argument(
+        "--seeds", type=int, nargs="+", default=range(1, STUDENTS + 1), help="which students"
+    )
+    parser.add_argument("--draws", type=int, default=EACH, help="of each scene; 2, to see it run")
     parser.add_argument("--workers", type=int, default=2, help="processes")
     given = parser.parse_args(argv)
     if given.part == "teach":
-        teach(given.folder, given.workers)
+        teach(given.folder, given.seeds, given.workers)
     elif given.part == "judge":
-        judge(given.folder, given.board, given.workers, given.draws)
+        judge(given.folder, given.seeds, given.workers, given.draws)
+    elif given.part == "keep":
+        keep(given.folder)
     else:
-        table(given.folder, given.board)
+        table()
 
 
 if __name__ == "__main__":
