@@ -141,9 +141,9 @@ def chosen(found: Mapping[str, tuple[Floats, Floats]]) -> dict[str, str]:
     return best
 
 
-def kept() -> list[EpisodeRow]:
-    """Rows of the judged parts that are kept here."""
-    return read_rows(JUDGED) if JUDGED.exists() else []
+def kept(path: Path = JUDGED) -> list[EpisodeRow]:
+    """Rows of the parts that are kept here."""
+    return read_rows(path) if path.exists() else []
 
 
 def valid_rows(path: Path) -> list[EpisodeRow]:

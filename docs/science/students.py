@@ -87,7 +87,7 @@ def judge(folder: Path, seeds: Iterable[int], workers: int, draws: int) -> None:
 
 def keep(folder: Path) -> None:
     """Keep the rows of the students of a folder, each by the name of its arm."""
-    rows = read_rows(WALKED) if WALKED.exists() else []
+    rows = kept(WALKED)
     done = {(row.controller, row.seed) for row in rows}
     for arm in ARMS:
         for path in sorted(folder.glob(f"judged-{arm}-*/trials.csv")):
@@ -101,9 +101,10 @@ def keep(folder: Path) -> None:
 
 def table() -> None:
     """Print each arm beside the blind rules, and the arms beside one another."""
-    walked = read_rows(WALKED)
+    walked = kept(WALKED)
     by_arm = [{row.seed for row in walked if row.controller == arm} for arm in ARMS]
-    whole = set.intersection(*by_arm)
+    if not (whole := set.intersection(*by_arm)):
+        sys.exit(f"{WALKED}: expected a part of the board that all arms have walked, found none")
     board = [replace(row, controller=plain(row.controller)) for row in kept()]
     found = cells(row for row in [*board, *walked] if row.seed in whole)
     print("| | crossed | time [% of limit] |\n|---|---|---|")
