@@ -29,7 +29,6 @@ from pathlib import Path
 
 from paces import BLIND, EACH, JUDGED, PARTS, cells, judged, kept, run, valid_rows
 
-from antennate_lab.compete.checking import read_rows
 from antennate_lab.compete.config import SCENES_OF_BOARD, plain
 from antennate_lab.compete.episodes import EpisodeRow
 
@@ -86,13 +85,13 @@ def judge(folder: Path, seeds: Iterable[int], workers: int, draws: int) -> None:
 
 
 def keep(folder: Path) -> None:
-    """Keep the rows of the students of a folder, each by the name of its arm."""
+    """Keep the rows of the students of a folder, each by a policy's name in place of its path."""
     rows = kept(WALKED)
     done = {(row.controller, row.seed) for row in rows}
     for arm in ARMS:
         for path in sorted(folder.glob(f"judged-{arm}-*/trials.csv")):
-            own = [replace(row, controller=arm) for row in valid_rows(path)]
-            rows += own * ((arm, own[0].seed) not in done)
+            own = [replace(row, controller=f"{arm}.onnx") for row in valid_rows(path)]
+            rows += own * ((own[0].controller, own[0].seed) not in done)
     with WALKED.open("w", newline="") as file:
         table = csv.DictWriter(file, [field.name for field in fields(EpisodeRow)])
         table.writeheader()
@@ -101,7 +100,7 @@ def keep(folder: Path) -> None:
 
 def table() -> None:
     """Print each arm beside the blind rules, and the arms beside one another."""
-    walked = kept(WALKED)
+    walked = [replace(row, controller=Path(row.controller).stem) for row in kept(WALKED)]
     by_arm = [{row.seed for row in walked if row.controller == arm} for arm in ARMS]
     if not (whole := set.intersection(*by_arm)):
         sys.exit(f"{WALKED}: expected a part of the board that all arms have walked, found none")
