@@ -146,9 +146,11 @@ def kept(path: Path = JUDGED) -> list[EpisodeRow]:
     return read_rows(path) if path.exists() else []
 
 
-def valid_rows(path: Path) -> list[EpisodeRow]:
-    """Rows of a table whose episodes are all valid."""
+def whole_part(path: Path) -> list[EpisodeRow]:
+    """Rows of a part that has all its draws, and valid episodes alone."""
     rows = read_rows(path)
+    if (found := len({row.trial for row in rows})) != EACH:
+        sys.exit(f"{path}: expected {EACH} draws of each scene, found {found}")
     if late := [row.reason for row in rows if row.outcome == "invalid"]:
         sys.exit(f"{path}: expected valid episodes alone, found {len(late)}: {late[0]}")
     return rows
@@ -158,7 +160,7 @@ def keep(folder: Path) -> None:
     """Keep the rows of the parts of a folder that are whole."""
     done = {row.seed for row in kept()}
     for path in sorted(folder.glob("judged-*/trials.csv")):
-        if valid_rows(path)[0].seed not in done:
+        if whole_part(path)[0].seed not in done:
             head, _, rest = path.read_text().partition("\n")
             JUDGED.write_text((JUDGED.read_text() if JUDGED.exists() else f"{head}\n") + rest)
 
@@ -202,7 +204,8 @@ def table(folder: Path) -> None:
         count, time = f"{crossed.sum():.0f} of {crossed.size}", f"{100 * share.mean():.1f}"
         print(f"| `{plain(name)}` | {pace} | {count} | {time} | {'yes' * (name in best)} |")
     rows = kept()
-    if not rows:
+    if (found := len({row.seed for row in rows})) < PARTS:
+        print(f"\nJudged: {found} of {PARTS} parts. Nothing is told of them before all are there.")
         return
     result = standing(rows, CompeteConfig().tie)
     print("", sentence(result), apart(result), markdown(result), sep="\n\n")

@@ -27,7 +27,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, fields, replace
 from pathlib import Path
 
-from paces import BLIND, EACH, JUDGED, PARTS, cells, judged, kept, run, valid_rows
+from paces import BLIND, EACH, JUDGED, PARTS, cells, judged, kept, run, whole_part
 
 from antennate_lab.compete.config import SCENES_OF_BOARD, plain
 from antennate_lab.compete.episodes import EpisodeRow
@@ -90,7 +90,7 @@ def keep(folder: Path) -> None:
     done = {(row.controller, row.seed) for row in rows}
     for arm in ARMS:
         for path in sorted(folder.glob(f"judged-{arm}-*/trials.csv")):
-            own = [replace(row, controller=f"{arm}.onnx") for row in valid_rows(path)]
+            own = [replace(row, controller=f"{arm}.onnx") for row in whole_part(path)]
             rows += own * ((own[0].controller, own[0].seed) not in done)
     with WALKED.open("w", newline="") as file:
         table = csv.DictWriter(file, [field.name for field in fields(EpisodeRow)])
@@ -102,16 +102,16 @@ def table() -> None:
     """Print each arm beside the blind rules, and the arms beside one another."""
     walked = [replace(row, controller=Path(row.controller).stem) for row in kept(WALKED)]
     by_arm = [{row.seed for row in walked if row.controller == arm} for arm in ARMS]
-    if not (whole := set.intersection(*by_arm)):
-        sys.exit(f"{WALKED}: expected a part of the board that all arms have walked, found none")
+    if (found := len(whole := set.intersection(*by_arm))) < PARTS:
+        sys.exit(f"{WALKED}: expected {PARTS} parts that all arms have walked, found {found}")
     board = [replace(row, controller=plain(row.controller)) for row in kept()]
-    found = cells(row for row in [*board, *walked] if row.seed in whole)
+    shown = cells(row for row in [*board, *walked] if row.seed in whole)
     print("| | crossed | time [% of limit] |\n|---|---|---|")
-    for name, (crossed, share) in found.items():
+    for name, (crossed, share) in shown.items():
         print(f"| {name} | {crossed.sum():.0f} of {crossed.size} | {100 * share.mean():.1f} |")
     pairs = [*((arm, blind) for arm in ARMS for blind in BLIND), ("design45", "today")]
     pairs += [(arm, "blind") for arm in ("today", "design45")]
-    print("", *(judged(a, found[a], b, found[b]) for a, b in pairs), sep="\n\n")
+    print("", *(judged(a, shown[a], b, shown[b]) for a, b in pairs), sep="\n\n")
 
 
 def main(argv: Sequence[str]) -> None:

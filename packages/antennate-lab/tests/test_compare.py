@@ -186,6 +186,10 @@ HEAD = 'imu = { kind = "head" }\n'
 BACKLASH = "yaw.backlash[0]"
 
 
+LATE = 0.02
+"""Share of missed ticks above which `drive` calls a computer late (docs/hardware.md)."""
+
+
 class Twin:
     """A twin that takes orders from a pipe."""
 
@@ -209,31 +213,37 @@ class Twin:
         time.sleep(0.5)
 
     def rows(self, out: str, file: Path) -> dict[str, dict[str, Any]]:
-        """Record the protocol, compare it, and give the doctor's rows by their check."""
+        """Record the protocol, compare it, and give the doctor's rows by their check.
+
+        A computer that was late has recorded its own pace: up to four drives are made, until one
+        is not late, and the one that missed the fewest ticks is compared.
+        """
         words = ["--config", "twin.toml", "--dry-run", "1", "--no-touch-check", "--arm"]
-        words += ["--protocol", "short.toml", "--tell", "orders", "--out", out]
+        words += ["--protocol", "short.toml", "--tell", "orders"]
         words += ["--limits.late-answers", "100", "--limits.silent-answers", "100"]
-        drive = [*ANTENNATE, "drive", *words]
-        for _ in range(3):
+        missed, said = dict[str, float](), []
+        while len(said) < 4 and min(missed.values(), default=1.0) > LATE:
+            name = f"{out}-{len(said)}"
+            drive = [*ANTENNATE, "drive", *words, "--out", name]
             driven = subprocess.run(drive, cwd=self.folder, capture_output=True, timeout=120)
-            result = json.loads((self.folder / out / "result.json").read_text())
+            said.append(driven.stderr.decode())
+            result = json.loads((self.folder / name / "result.json").read_text())
             if result["ended"] not in ("a HOLD", "a fault"):
-                break  # else this computer was late, and the same command goes on where it was
-        assert driven.returncode == 0, driven.stderr.decode()
-        doctor = [*ANTENNATE, "doctor", "--no-config", "--json", "--compare", str(file), out]
+                assert driven.returncode == 0, said
+                missed[name] = result["walking"]["missed_share"]
+        assert missed, said
+        best = min(missed, key=lambda name: missed[name])
+        doctor = [*ANTENNATE, "doctor", "--no-config", "--json", "--compare", str(file), best]
         done = subprocess.run(doctor, cwd=self.folder, capture_output=True, timeout=400)
         assert done.returncode == 0, done.stderr.decode()
         return {row["check"]: row for row in json.loads(done.stdout)["rows"]}
 
 
-@pytest.mark.ci
+@pytest.mark.slow  # .ci/run runs it alone: what servos do is measured in real time
 def test_twin_with_joints_repaired_wrongly_is_told_from_one_that_nobody_touched(
     tmp_path: Path,
 ) -> None:
-    """The gain of a leg is halved and given back; a yaw joint has 2 degrees of backlash.
-
-    Bounds are those of a computer that misses up to a hundred cycles of a drive.
-    """
+    """The gain of a leg is halved and given back; a yaw joint has 2 degrees of backlash."""
     known = KNOWN | {BACKLASH: (0.0, 0.001)}
     file = fitted(tmp_path, HEAD, **known)
     twin = Twin(tmp_path, HEAD + "[yaw]\nbacklash = [0.035, 0.0, 0.0, 0.0, 0.0]\n")
@@ -241,17 +251,17 @@ def test_twin_with_joints_repaired_wrongly_is_told_from_one_that_nobody_touched(
         twin.order("fault servo:8=position_p_gain:350")
         wrong = twin.rows("wrong", file)
         assert wrong["leg_l1"]["grade"] == "warn"
-        assert numbers_of(wrong["leg_l1"]["found"])["gain"] == pytest.approx(0.5, abs=0.1)
+        assert numbers_of(wrong["leg_l1"]["found"])["gain"] == pytest.approx(0.5, abs=0.05)
         assert wrong["yaw1"]["grade"] == "warn"
         assert "backlash not as fitted" in wrong["yaw1"]["cure"]
-        assert 1.0 < numbers_of(wrong["yaw1"]["found"])["backlash"] < 4.0
+        assert 1.0 < numbers_of(wrong["yaw1"]["found"])["backlash"] < 3.0
         assert out_of_range(wrong["leg_r2"]) <= {"lag"}
-        assert numbers_of(wrong["leg_r2"]["found"])["gain"] == pytest.approx(1.0, abs=0.2)
+        assert numbers_of(wrong["leg_r2"]["found"])["gain"] == pytest.approx(1.0, abs=0.1)
         twin.order("fault servo:8=position_p_gain:700")
         right = twin.rows("right", file)
         # A lag of the twin is up to a control period more, as its clock happens to stand.
         assert out_of_range(right["leg_l1"]) <= {"lag"}
-        assert numbers_of(right["leg_l1"]["found"])["gain"] == pytest.approx(1.0, abs=0.2)
+        assert numbers_of(right["leg_l1"]["found"])["gain"] == pytest.approx(1.0, abs=0.1)
     finally:
         twin.process.kill()
         twin.process.communicate()
